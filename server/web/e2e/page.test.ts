@@ -218,6 +218,61 @@ describe('time', () => {
     });
   });
 
+  /** A page at full speed with `count` pendulums that have far to go. */
+  async function atFullSpeed(count: number, work: (visit: Visit, view: View) => Promise<void>): Promise<void> {
+    const folder = mkdtempSync(join(tmpdir(), 'mbcosim-'));
+    writeFileSync(join(folder, 'pendulums.mbd'), pendulums(count).replace('final time: 100.; time step: 0.005', 'final time: 1.e6; time step: 0.0005'));
+    await withPage(browser, join(folder, 'pendulums.mbd'), async (visited, view) => {
+      await button(visited.page, 'Save state').click();
+      await button(visited.page, 'Restore the state at 0 s').waitFor();
+      await visited.page.getByRole('combobox', { name: 'Speed' }).selectOption('Infinity');
+      await button(visited.page, 'Run (space)').click();
+      await samplesReach(visited.page, 0.005);
+      await work(visited, view);
+      expect(await visited.page.locator('.banner').textContent()).toBe('');
+    });
+    rmSync(folder, { recursive: true });
+  }
+
+  test('goes on slowly at once after full speed', async () => {
+    await atFullSpeed(1, async ({ page }, view) => {
+      await samplesReach(page, 1);
+      await page.getByRole('combobox', { name: 'Speed' }).selectOption('0.01');
+      await page.waitForTimeout(1000);
+      const slow = await timeOf(view);
+      await samplesReach(page, slow + 0.01);
+      await button(page, 'Pause (space)').click();
+      await rested(page);
+    });
+  });
+
+  test('at full speed is left for a step, for a run until a given time and for a saved state', async () => {
+    await atFullSpeed(400, async ({ page }, view) => {
+      await page.keyboard.press('s');
+      await rested(page);
+      const stepped = await view.read([]);
+      await page.waitForTimeout(300);
+      expect((await view.read([])).step).toBe(stepped.step);
+      await atStep(page, stepped.step);
+      await button(page, 'Run (space)').click();
+      await samplesReach(page, stepped.time + 0.005);
+      const goal = await page.evaluate(() => {
+        const field = document.querySelector<HTMLInputElement>('.time input[type=number]') as HTMLInputElement;
+        field.value = String(parseFloat(document.querySelector('.time output')?.textContent ?? '') + 0.5);  // is not reached before
+        field.dispatchEvent(new KeyboardEvent('keydown', { key: 'Enter' }));
+        return field.valueAsNumber;
+      });
+      await button(page, 'Run (space)').waitFor();
+      await rested(page);
+      expect(Math.abs((await timeOf(view)) - goal)).toBeLessThan(0.0005);
+      await button(page, 'Run (space)').click();
+      await samplesReach(page, goal + 0.005);
+      await button(page, 'Restore the state at 0 s').click();
+      await atStep(page, 0);
+      expect((await view.read([])).step).toBe(0);
+    });
+  });
+
   test('a restored state is the saved one, and steps from there give what they gave', async () => {
     await withPage(browser, 'pendulum.mbd', async (visited, view) => {
       const { page } = visited;
@@ -448,6 +503,35 @@ describe('inputs', () => {
       await moveSliderUnderSample(page, 'stream.force', '2.5');
       await becomes(view, 'stream.force', [2.5]);
     });
+  });
+});
+
+describe('inputs while the page runs', () => {
+  test('are written between its steps, and it runs on', async () => {
+    const folder = mkdtempSync(join(tmpdir(), 'mbcosim-'));
+    writeFileSync(join(folder, 'pendulums.mbd'), pendulums(200));
+    await withPage(browser, join(folder, 'pendulums.mbd'), async ({ page }, view) => {
+      await page.locator('summary', { hasText: 'Inputs' }).click();
+      const field = page.getByRole('spinbutton', { name: 'node 1.load.fx, value' });
+      await field.waitFor();
+      for (const speed of ['10', 'Infinity']) {
+        await page.getByRole('combobox', { name: 'Speed' }).selectOption(speed);
+        if (speed === '10') await page.getByRole('button', { name: 'Run (space)' }).click();
+        for (let force = 1; force <= 3; ++force) {
+          const { time } = await view.read([]);
+          await samplesReach(page, time + 0.01);
+          await field.fill(String(force));
+          await field.press('Enter');
+          await becomes(view, 'node.structural.1.load', [force, 0, 0, 0, 0, 0]);
+        }
+      }
+      await samplesReach(page, (await view.read([])).time + 0.01);
+      await page.getByRole('button', { name: 'Pause (space)' }).click();
+      await rested(page);
+      expect(await page.locator('.banner').textContent()).toBe('');
+      expect(await field.inputValue()).toBe('3');
+    });
+    rmSync(folder, { recursive: true });
   });
 });
 
