@@ -60,6 +60,18 @@ function options(timeout) {
   throw new RangeError(`timeout: must be a positive number of seconds, at most ${LONGEST}, or undefined for no bound, got ${timeout}`);
 }
 
+/** Counts so many seconds down from now: tells what is left; undefined: no bound. */
+function countdown(timeout) {
+  const { deadline } = options(timeout);
+  return () => deadline && Math.max((deadline - Date.now()) / 1000, 1e-3);
+}
+
+/** What grpc-js throws for a call that ends so. */
+function failure(name, details) {
+  const code = grpc.status[name];
+  return Object.assign(new Error(`${code} ${name}: ${details}`), { code, details, metadata: new grpc.Metadata() });
+}
+
 /** Protobuf would make a whole number of anything. */
 function whole(count, name) {
   if (Number.isSafeInteger(count)) return count;
@@ -82,14 +94,12 @@ function checked(message, type) {
   return message;
 }
 
-/** Waits, not for ever, while a connection is made. grpc-js waits as long as a server accepts connections and says nothing. */
-async function reach(client) {
-  const channel = client.getChannel(), latest = Date.now() + 1000 * CONNECTING, { IDLE, CONNECTING: underway } = grpc.connectivityState;
+/** Waits, not for ever, while a connection is made. grpc-js waits as long as a server accepts connections and says nothing. `deadline`: the call's. */
+async function reach(client, { deadline = Infinity }) {
+  const channel = client.getChannel(), patience = Date.now() + 1000 * CONNECTING, latest = Math.min(patience, deadline);
+  const { IDLE, CONNECTING: underway } = grpc.connectivityState;
   for (let state; [IDLE, underway].includes((state = channel.getConnectivityState(true))); ) {
-    if (Date.now() >= latest) {
-      const details = `the server at ${channel.getTarget()} accepts connections and does not answer`;
-      throw Object.assign(new Error(`${grpc.status.UNAVAILABLE} UNAVAILABLE: ${details}`), { code: grpc.status.UNAVAILABLE, details, metadata: new grpc.Metadata() });
-    }
+    if (Date.now() >= latest) throw failure(latest < patience ? "DEADLINE_EXCEEDED" : "UNAVAILABLE", `the server at ${channel.getTarget()} accepts connections and does not answer`);
     await new Promise((resolve) => channel.watchConnectivityState(state, latest, () => resolve()));
   }
 }
@@ -106,7 +116,7 @@ export function about(server, simulation) {
 export async function call(server, client, method, request, timeout) {
   const choices = options(timeout);
   checked(request, client[method].requestType.type);
-  await reach(client);
+  await reach(client, choices);
   return new Promise((resolve, reject) =>
     client[method](request, about(server, request.simulation), choices, (error, reply) => (error ? reject(error) : resolve(reply))),
   );
@@ -115,11 +125,11 @@ export async function call(server, client, method, request, timeout) {
 /** The same for a call of Simulations that may be repeated, as it changes nothing or has an id. The bound grows by `reconnect`. */
 async function repeated(server, method, request, timeout) {
   options(timeout); // refuses what is none
-  const latest = timeout === undefined ? undefined : Date.now() + 1000 * (timeout + server.reconnect);
+  const left = countdown(timeout && timeout + server.reconnect);
   let end;
   for (let pause = 50; ; pause = Math.min(2 * pause, 1000)) {
     try {
-      return await call(server, server.simulations, method, request, latest && Math.max((latest - Date.now()) / 1000, 1e-3));
+      return await call(server, server.simulations, method, request, left());
     } catch (error) {
       end ??= Date.now() + 1000 * server.reconnect;
       if (error.code !== grpc.status.UNAVAILABLE || Date.now() >= end) throw error;
@@ -128,38 +138,57 @@ async function repeated(server, method, request, timeout) {
   }
 }
 
-/** A series of messages, for `for await`; who leaves that ends the call. */
-export async function* series(server, client, method, request, timeout) {
-  const choices = options(timeout);
-  checked(request, client[method].requestType.type);
-  await reach(client);
-  const stream = client[method](request, about(server, request.simulation), choices);
-  try {
-    yield* stream;
-  } finally {
-    stream.on("error", () => {}); // tells that it is cancelled
-    stream.cancel();
+/**
+ * A series of messages, for `for await`, which begins the call when it asks for the first; who leaves that ends the call. `cancel()` does
+ * so from elsewhere: a loop that waits ends. `timeout`: seconds for the whole series.
+ */
+export function series(server, client, method, request, timeout) {
+  let stream, cancelled = false, wake;
+  const waked = new Promise((resolve) => (wake = resolve));
+  async function* messages() {
+    const choices = options(timeout);
+    checked(request, client[method].requestType.type);
+    await Promise.race([waked, reach(client, choices)]);
+    if (cancelled) return;
+    stream = client[method](request, about(server, request.simulation), choices);
+    stream.on("error", () => {}); // is thrown to who waits; nobody does when the series is left
+    try {
+      yield* stream;
+    } catch (error) {
+      if (!cancelled) throw error;
+    } finally {
+      stream.cancel();
+    }
   }
+  const cancel = () => {
+    cancelled = true;
+    wake();
+    stream?.cancel();
+  };
+  return Object.assign(messages(), { cancel });
 }
 
-/** Creates a simulation from a deck without includes. `choices`: CreateOptions. */
-export async function load(server, deck, choices = {}) {
+/** Creates a simulation from a deck without includes. `choices`: CreateOptions; `timeout`: seconds; undefined: as long as it takes. */
+export async function load(server, deck, choices = {}, timeout) {
   const name = basename(deck);
-  return create(server, { header: { bundle_main_file: name, options: { protocol: PROTOCOL, ...choices } }, files: [{ path: name, data: await readFile(deck) }] });
+  return create(server, { header: { bundle_main_file: name, options: { protocol: PROTOCOL, ...choices } }, files: [{ path: name, data: await readFile(deck) }] }, timeout);
 }
 
 /** Creates a simulation from a deck given as text. */
-export async function loadText(server, text, choices = {}) {
-  return create(server, { header: { bundle_main_file: "deck", options: { protocol: PROTOCOL, ...choices } }, files: [{ path: "deck", data: Buffer.from(text) }] });
+export async function loadText(server, text, choices = {}, timeout) {
+  return create(server, { header: { bundle_main_file: "deck", options: { protocol: PROTOCOL, ...choices } }, files: [{ path: "deck", data: Buffer.from(text) }] }, timeout);
 }
 
-async function create(server, upload) {
+async function create(server, upload, timeout) {
   upload.header.options.request_id ??= randomUUID();
-  const reply = await repeated(server, "CreateSimulationInline", upload);
+  const reply = await repeated(server, "CreateSimulationInline", upload, timeout);
   return new Simulation(server, reply.simulation);
 }
 
-/** A simulation on the server. */
+/**
+ * A simulation on the server. The last argument of its methods, `timeout`, bounds all that they do, in seconds; undefined: calls that advance
+ * or go through the model take as long as they take, all others USUAL seconds.
+ */
 export class Simulation {
   #handles = new Map();
 
@@ -173,69 +202,74 @@ export class Simulation {
     return repeated(this.server, method, request, timeout);
   }
   /** The same for calls that may take as long as they take. */
-  #work(method, request) {
-    return repeated(this.server, method, request);
+  #work(method, request, timeout) {
+    return repeated(this.server, method, request, timeout);
   }
 
   /** Handles of variables by name; asks for those that are not known. */
-  async handles(names) {
+  async handles(names, timeout) {
     const missing = names.filter((name) => !this.#handles.has(name));
     if (missing.length > 0) {
-      const { model } = await this.#call("DescribeSimulation", { simulation: this.name, variable_names: missing });
+      const { model } = await this.#call("DescribeSimulation", { simulation: this.name, variable_names: missing }, timeout);
       for (const variable of model.variables) this.#handles.set(variable.name, variable.handle);
     }
     return names.map((name) => this.#handles.get(name));
   }
 
   /** Nodes, elements and variables, page by page. */
-  async *describe() {
-    for await (const page of this.#pages("DescribeSimulation", {})) yield page.model;
+  async *describe(timeout) {
+    for await (const page of this.#pages("DescribeSimulation", {}, timeout)) yield page.model;
   }
 
-  async *#pages(method, request) {
+  async *#pages(method, request, timeout) {
+    const left = countdown(timeout);
     let token = "";
     do {
-      const page = await this.#work(method, { simulation: this.name, ...request, page_token: token });
+      const page = await this.#work(method, { simulation: this.name, ...request, page_token: token }, left());
       yield page;
       token = page.next_page_token;
     } while (token);
   }
 
   /** Numbers of a variable at the last accepted step. */
-  async read(name) {
-    return (await this.#call("ReadVariables", { simulation: this.name, handles: await this.handles([name]) })).values;
+  async read(name, timeout) {
+    const left = countdown(timeout);
+    return (await this.#call("ReadVariables", { simulation: this.name, handles: await this.handles([name], left()) }, left())).values;
   }
 
-  /** Takes steps; StepReply. */
-  async step(steps = 1, outputs = []) {
-    return this.#work("Step", {
+  /** Takes steps; StepReply. One that is not done in time is interrupted. */
+  async step(steps = 1, outputs = [], timeout) {
+    const left = countdown(timeout);
+    const request = {
       simulation: this.name,
       steps: whole(steps, "steps"),
-      outputs: await this.handles(outputs),
+      outputs: await this.handles(outputs, left()),
       request_id: randomUUID(),
-    });
+    };
+    return this.#work("Step", request, left());
   }
 
-  /** An open stream for stepping with the least delay: `await stepper.step()`, at last `stepper.close()`. */
-  async stepper(outputs = []) {
-    const handles = await this.handles(outputs);
-    await reach(this.server.simulations);
-    return new Stepper(this.server, this.name, handles);
+  /** An open stream for stepping with the least delay: `await stepper.step()`, at last `stepper.close()`. `timeout` bounds the whole stream. */
+  async stepper(outputs = [], timeout) {
+    const choices = options(timeout);
+    const handles = await this.handles(outputs, timeout);
+    await reach(this.server.simulations, choices);
+    return new Stepper(this.server, this.name, handles, choices);
   }
 
   /** What a viewer needs, message by message. */
-  geometry(request = {}) {
-    return series(this.server, this.server.geometry, "DescribeGeometry", { simulation: this.name, ...request });
+  geometry(request = {}, timeout) {
+    return series(this.server, this.server.geometry, "DescribeGeometry", { simulation: this.name, ...request }, timeout);
   }
 
   /** The descriptor form E ẏ = A y about the current state, page by page: sparse parts `e` and `a`, and `state_names`. */
-  linearize() {
-    return this.#pages("Linearize", { descriptor_form: true });
+  linearize(timeout) {
+    return this.#pages("Linearize", { descriptor_form: true }, timeout);
   }
 
   /** Ends the simulation. */
-  delete() {
-    return this.#call("DeleteSimulation", { simulation: this.name, request_id: randomUUID() });
+  delete(timeout) {
+    return this.#call("DeleteSimulation", { simulation: this.name, request_id: randomUUID() }, timeout);
   }
 }
 
@@ -244,9 +278,9 @@ class Stepper {
   #waiting = [];
   #failure;
 
-  constructor(server, simulation, outputs) {
+  constructor(server, simulation, outputs, choices) {
     this.request = { simulation, outputs };
-    this.stream = server.simulations.StepStream(about(server, simulation));
+    this.stream = server.simulations.StepStream(about(server, simulation), choices);
     this.stream.on("data", (reply) => this.#waiting.shift()?.resolve(reply.step));
     this.stream.on("error", (error) => this.#end(error));
     this.stream.on("end", () => this.#end(new Error("the server has ended the stream")));

@@ -3,8 +3,9 @@ import assert from "node:assert/strict";
 import { once } from "node:events";
 import { createServer } from "node:net";
 import { after, test } from "node:test";
+import { fileURLToPath } from "node:url";
 
-import { call, connect, loadText, series } from "../mbcosim.mjs";
+import { Simulation, call, connect, load, loadText, series } from "../mbcosim.mjs";
 
 const server = connect(process.env.MBCOSIM_ADDRESS);
 after(() => server.close());
@@ -126,14 +127,74 @@ test("a series that is left early ends its call", async () => {
   await simulation.delete();
 });
 
-test("a server that accepts connections and says nothing is not waited for, for ever", async () => {
+test("a series that waits is cancelled from elsewhere, and its loop ends", async () => {
+  const simulation = await loadText(server, body);
+  const batches = series(server, server.telemetry, "Subscribe", { simulation: simulation.name });
+  await batches.next(); // nothing more comes while nobody steps
+  const waits = (async () => {
+    for await (const _ of batches);
+  })();
+  batches.cancel();
+  await waits;
+  assert.deepEqual(await batches.next(), { done: true, value: undefined });
+  await simulation.delete();
+});
+
+test("a series that is refused tells who asks for its messages, whenever that is", async () => {
+  const simulation = await loadText(server, body);
+  await simulation.delete();
+  const messages = simulation.geometry();
+  await new Promise((resolve) => setTimeout(resolve, 300));
+  await assert.rejects(messages.next(), { code: 5 });
+});
+
+/** Does `work` with a connection to a server that accepts connections and says nothing. */
+async function beforeSilence(work) {
   const visitors = [], silent = createServer((visitor) => visitors.push(visitor)).listen(0, "127.0.0.1");
   await once(silent, "listening");
   const other = connect(`127.0.0.1:${silent.address().port}`);
-  await assert.rejects(loadText(other, body), /UNAVAILABLE: the server at .* accepts connections and does not answer/);
+  await work(other);
   other.close();
   silent.close();
   for (const visitor of visitors) visitor.destroy();
+}
+
+test("a server that accepts connections and says nothing is not waited for, for ever", () =>
+  beforeSilence(async (other) => {
+    const batches = series(other, other.telemetry, "Subscribe", { simulation: "simulations/none" }), waits = batches.next();
+    batches.cancel();
+    assert.equal((await waits).done, true);
+    await assert.rejects(loadText(other, body), /UNAVAILABLE: the server at .* accepts connections and does not answer/);
+  }));
+
+test("every call takes a deadline as its last argument", async () => {
+  await beforeSilence(async (other) => {
+    const there = new Simulation(other, { name: "simulations/none" }), first = (messages) => messages.next();
+    const calls = [
+      (timeout) => call(other, other.simulations, "GetSimulation", { simulation: there.name }, timeout),
+      (timeout) => first(series(other, other.telemetry, "Subscribe", { simulation: there.name }, timeout)),
+      (timeout) => load(other, fileURLToPath(import.meta.url), {}, timeout),
+      (timeout) => loadText(other, body, {}, timeout),
+      (timeout) => there.handles(["step"], timeout),
+      (timeout) => first(there.describe(timeout)),
+      (timeout) => there.read("step", timeout),
+      (timeout) => there.step(1, [], timeout),
+      (timeout) => there.step(1, ["step"], timeout),
+      (timeout) => there.stepper([], timeout),
+      (timeout) => first(there.geometry({}, timeout)),
+      (timeout) => first(there.linearize(timeout)),
+      (timeout) => there.delete(timeout),
+    ];
+    for (const each of calls) {
+      await assert.rejects(async () => each(-1), /^RangeError: timeout: must be/, String(each));
+      await assert.rejects(each(0.1), { code: 4 }, String(each)); // DEADLINE_EXCEEDED
+    }
+  });
+  const simulation = await loadText(server, body.replace("final time: 1.; time step: 0.25", "final time: 1.e6; time step: 1.e-6"));
+  await assert.rejects(simulation.step(1e9, [], 0.5), { code: 4 });
+  const stepper = await simulation.stepper([], 0.5);
+  await assert.rejects(stepper.step(1e9), { code: 4 });
+  await simulation.delete();
 });
 
 test("a model of 10 000 bodies passes the client's default limits", async () => {

@@ -201,9 +201,9 @@ export interface Visit {
 
 /** With `MBCOSIM_PAGE`, that file is shown in place of the daemon's page: tries a page without a new daemon. */
 async function prepared(page: Page, address: string): Promise<string> {
-  const file = process.env.MBCOSIM_PAGE, { origin, search, hash } = new URL(address);
-  if (!file || !search) return address;
-  await page.goto(address);  // the token becomes a cookie
+  const file = process.env.MBCOSIM_PAGE, { protocol, origin, search, hash } = new URL(address);
+  if (!file || protocol === 'file:') return address;
+  if (search) await page.goto(address);  // the token becomes a cookie
   await page.goto('about:blank');
   await page.route((url) => url.origin === origin && url.pathname === '/', (route) => route.fulfill({ contentType: 'text/html', body: readFileSync(file, 'utf8') }));
   return `${origin}/${hash}`;

@@ -218,6 +218,61 @@ describe('time', () => {
     });
   });
 
+  /** A page at full speed with `count` pendulums that have far to go. */
+  async function atFullSpeed(count: number, work: (visit: Visit, view: View) => Promise<void>): Promise<void> {
+    const folder = mkdtempSync(join(tmpdir(), 'mbcosim-'));
+    writeFileSync(join(folder, 'pendulums.mbd'), pendulums(count).replace('final time: 100.; time step: 0.005', 'final time: 1.e6; time step: 0.0005'));
+    await withPage(browser, join(folder, 'pendulums.mbd'), async (visited, view) => {
+      await button(visited.page, 'Save state').click();
+      await button(visited.page, 'Restore the state at 0 s').waitFor();
+      await visited.page.getByRole('combobox', { name: 'Speed' }).selectOption('Infinity');
+      await button(visited.page, 'Run (space)').click();
+      await samplesReach(visited.page, 0.005);
+      await work(visited, view);
+      expect(await visited.page.locator('.banner').textContent()).toBe('');
+    });
+    rmSync(folder, { recursive: true });
+  }
+
+  test('goes on slowly at once after full speed', async () => {
+    await atFullSpeed(1, async ({ page }, view) => {
+      await samplesReach(page, 1);
+      await page.getByRole('combobox', { name: 'Speed' }).selectOption('0.01');
+      await page.waitForTimeout(1000);
+      const slow = await timeOf(view);
+      await samplesReach(page, slow + 0.01);
+      await button(page, 'Pause (space)').click();
+      await rested(page);
+    });
+  });
+
+  test('at full speed is left for a step, for a run until a given time and for a saved state', async () => {
+    await atFullSpeed(400, async ({ page }, view) => {
+      await page.keyboard.press('s');
+      await rested(page);
+      const stepped = await view.read([]);
+      await page.waitForTimeout(300);
+      expect((await view.read([])).step).toBe(stepped.step);
+      await atStep(page, stepped.step);
+      await button(page, 'Run (space)').click();
+      await samplesReach(page, stepped.time + 0.005);
+      const goal = await page.evaluate(() => {
+        const field = document.querySelector<HTMLInputElement>('.time input[type=number]') as HTMLInputElement;
+        field.value = String(parseFloat(document.querySelector('.time output')?.textContent ?? '') + 0.5);  // is not reached before
+        field.dispatchEvent(new KeyboardEvent('keydown', { key: 'Enter' }));
+        return field.valueAsNumber;
+      });
+      await button(page, 'Run (space)').waitFor();
+      await rested(page);
+      expect(Math.abs((await timeOf(view)) - goal)).toBeLessThan(0.0005);
+      await button(page, 'Run (space)').click();
+      await samplesReach(page, goal + 0.005);
+      await button(page, 'Restore the state at 0 s').click();
+      await atStep(page, 0);
+      expect((await view.read([])).step).toBe(0);
+    });
+  });
+
   test('a restored state is the saved one, and steps from there give what they gave', async () => {
     await withPage(browser, 'pendulum.mbd', async (visited, view) => {
       const { page } = visited;
@@ -451,6 +506,118 @@ describe('inputs', () => {
   });
 });
 
+describe('inputs while the page runs', () => {
+  test('are written between its steps, and it runs on', async () => {
+    const folder = mkdtempSync(join(tmpdir(), 'mbcosim-'));
+    writeFileSync(join(folder, 'pendulums.mbd'), pendulums(200));
+    await withPage(browser, join(folder, 'pendulums.mbd'), async ({ page }, view) => {
+      await page.locator('summary', { hasText: 'Inputs' }).click();
+      const field = page.getByRole('spinbutton', { name: 'node 1.load.fx, value' });
+      await field.waitFor();
+      for (const speed of ['10', 'Infinity']) {
+        await page.getByRole('combobox', { name: 'Speed' }).selectOption(speed);
+        if (speed === '10') await page.getByRole('button', { name: 'Run (space)' }).click();
+        for (let force = 1; force <= 3; ++force) {
+          const { time } = await view.read([]);
+          await samplesReach(page, time + 0.01);
+          await field.fill(String(force));
+          await field.press('Enter');
+          await becomes(view, 'node.structural.1.load', [force, 0, 0, 0, 0, 0]);
+        }
+      }
+      await samplesReach(page, (await view.read([])).time + 0.01);
+      await page.getByRole('button', { name: 'Pause (space)' }).click();
+      await rested(page);
+      expect(await page.locator('.banner').textContent()).toBe('');
+      expect(await field.inputValue()).toBe('3');
+    });
+    rmSync(folder, { recursive: true });
+  });
+});
+
+/** Waits until the page was told so often how the simulation is. */
+async function polled(page: Page, times: number): Promise<void> {
+  for (let i = 0; i < times; ++i) await page.waitForResponse('**/mbcosim.v1.Simulations/GetSimulation');
+  await scene(page);
+}
+
+describe('what is shown of a simulation that changes', () => {
+  /** What the button with the focus is called. */
+  const focused = (page: Page) => page.evaluate(() => {
+    const button = document.activeElement?.closest('button');
+    return button?.textContent || button?.getAttribute('aria-label');
+  });
+
+  test('the list keeps the focus and what is pressed', async () => {
+    await withPage(browser, 'pendulum.mbd', async ({ page }, view) => {
+      const other = await create(view, 'heavy_top.mbd');
+      await page.getByRole('tab', { name: 'Simulations' }).click();
+      const row = page.locator('.list .name', { hasText: 'heavy_top.mbd' }), mine = page.locator('.list .card.current .name');
+      await row.waitFor();
+      for (const [simulation, name] of [[view.simulation, mine], [other, row]] as const) {
+        if (name === mine) await name.focus();
+        else {
+          await name.hover();
+          await page.mouse.down();
+        }
+        const { time } = await view.call<{ time: number }>('Simulations/Step', { simulation, steps: 10 });
+        await name.getByText(`ready, ${time} s`).waitFor();
+        expect(await focused(page)).toBe(await name.textContent());
+      }
+      await page.mouse.up();
+      await atStep(page, 10);
+      await until(page, (name) => location.hash.includes(encodeURIComponent(name)), other);
+      await view.call('Simulations/DeleteSimulation', { simulation: view.simulation });
+      await mine.getByText('heavy_top.mbd').waitFor({ state: 'attached' });
+      await until(page, () => document.querySelectorAll('.left .list li').length === 1, undefined);
+    });
+  });
+
+  test('a failure keeps the focus, what is selected and what is pressed', async () => {
+    const folder = mkdtempSync(join(tmpdir(), 'mbcosim-'));
+    writeFileSync(join(folder, 'pendulums.mbd'), pendulums(3).replace('tolerance: 1.e-6; max iterations: 10', 'tolerance: 1.e-13; max iterations: 1'));
+    await withPage(browser, join(folder, 'pendulums.mbd'), async ({ page }) => {
+      await page.getByRole('button', { name: 'One step (S)' }).click();
+      const close = page.locator('.banner').getByRole('button', { name: 'Close' });
+      await close.focus();
+      const selected = () => page.evaluate(() => getSelection()?.toString());
+      await page.evaluate(() => getSelection()?.selectAllChildren(document.querySelector('.banner strong') as Element));
+      const text = await selected();
+      await polled(page, 2);
+      expect(text).not.toBe('');
+      expect(await selected()).toBe(text);
+      expect(await focused(page)).toBe('Close');
+      await close.hover();
+      await page.mouse.down();
+      await polled(page, 2);
+      await page.mouse.up();
+      await page.locator('.banner').waitFor({ state: 'hidden' });
+    });
+    rmSync(folder, { recursive: true });
+  });
+
+  test('of two that are opened, the later one stays', async () => {
+    await withPage(browser, 'pendulum.mbd', async ({ page }, view) => {
+      const late = await create(view, 'heavy_top.mbd'), quick = await create(view, 'slider_crank.mbd');
+      let release = () => {};
+      const held = new Promise<void>((resolve) => (release = resolve));
+      await page.route('**/mbcosim.v1.Simulations/DescribeSimulation', async (route) => {
+        if (route.request().postDataBuffer()?.includes(late)) await held;
+        await route.continue();
+      });
+      await page.getByRole('tab', { name: 'Simulations' }).click();
+      for (const name of ['heavy_top.mbd', 'slider_crank.mbd']) await page.locator('.list .name', { hasText: name }).click();
+      await until(page, (name) => location.hash.includes(encodeURIComponent(name)), quick);
+      const read = page.waitForResponse((reply) => reply.url().endsWith('/ReadVariables') && reply.request().postDataBuffer()?.includes(late) === true);
+      release();
+      await read;
+      await page.waitForTimeout(500);
+      expect(await page.title()).toBe('slider_crank.mbd – mbcosim');
+      expect(page.url()).toContain(encodeURIComponent(quick));
+    });
+  });
+});
+
 describe('who waits for whom', () => {
   test('is told while a step waits for a peer that does not answer', async () => {
     const folder = mkdtempSync(join(tmpdir(), 'mbcosim-'));
@@ -467,6 +634,9 @@ describe('who waits for whom', () => {
       peer.kill('SIGSTOP');
       await page.getByRole('button', { name: 'One step (S)' }).click();
       await page.getByText(/waits for the peer of port tip since \d/).waitFor();
+      const words = await page.locator('.banner .text').elementHandle();
+      await polled(page, 2);
+      expect(await words?.evaluate((element) => element.isConnected)).toBe(true);  // and is read aloud once
       peer.kill('SIGCONT');
       await atStep(page, 1);
       await close();
@@ -576,7 +746,11 @@ describe('who comes in', () => {
   test('without the token the page says what to do', async () => {
     const view = await View.start('pendulum.mbd');
     const visited = await visit(browser, `${view.origin}/`);
-    await visited.page.getByText('Open the address that the daemon printed').waitFor();
+    const words = visited.page.getByText('Open the address that the daemon printed');
+    await words.waitFor();
+    const said = await words.elementHandle();
+    for (let i = 0; i < 2; ++i) await visited.page.waitForResponse('**/mbcosim.v1.Simulations/ListSimulations');
+    expect(await said?.evaluate((element) => element.isConnected)).toBe(true);  // and is read aloud once
     await visited.close();
     await view.stop();
   });

@@ -37,6 +37,11 @@ export class App {
   private readonly left = h('nav', { class: 'left', 'aria-label': 'Model' });
   private readonly help = this.helpDialog();
   private unwatch: (() => void)[] = [];
+  /** What the banner is about; empty: nothing. */
+  private said: unknown = '';
+  /** Numbers of what was opened, and compared with, last. */
+  private opened = 0;
+  private compared = 0;
 
   /** `page`: text of the page before it shows anything. `recorded`: what it holds, if it is a recording. */
   constructor(root: HTMLElement, private readonly page: string, private readonly recorded?: Shown) {
@@ -58,24 +63,32 @@ export class App {
     void this.home.follow();
     window.addEventListener('hashchange', () => {
       const next = new URLSearchParams(location.hash.slice(1)).get('simulation');
-      if (next && next !== this.desk.session?.name) void this.open(next);
+      if (next === this.desk.session?.name) this.opened += 1;  // what is on its way is not wanted any more
+      else if (next) void this.open(next);
     });
   }
 
+  /** Shows a simulation, unless another is opened before it is there. */
   async open(name: string): Promise<void> {
+    const wish = ++this.opened;
     try {
-      this.desk.show(await Session.open(name));
+      const session = await Session.open(name);
+      if (wish !== this.opened) return session.close();
+      this.desk.show(session);
       history.replaceState(null, '', `#simulation=${encodeURIComponent(name)}`);
       void this.home.refresh();
       this.tab('scene');
     } catch (thrown) {
-      this.home.tell(failureOf(thrown));
+      if (wish === this.opened) this.home.tell(failureOf(thrown));
     }
   }
 
   private async compare(name: string): Promise<void> {
+    const wish = ++this.compared, shown = this.desk.shown.value;
     try {
-      this.scene.compareWith(await Session.open(name));
+      const session = await Session.open(name);
+      if (wish !== this.compared || shown !== this.desk.shown.value) return session.close();
+      this.scene.compareWith(session);
     } catch (thrown) {
       this.home.tell(failureOf(thrown));
     }
@@ -172,19 +185,27 @@ export class App {
     if (!session) {
       this.chip.className = `chip${this.desk.shown.value ? '' : ' hidden'}`;
       this.chip.textContent = 'recording';
-      this.banner.classList.add('hidden');
-      return;
+      return this.say('');
     }
     const gone = session.gone.value, lost = session.lost.value, state = lost ? 'lost' : STATES[session.info.value.state] ?? 'unknown';
     this.chip.className = `chip ${state}`;
     this.chip.textContent = gone ? 'gone' : state === 'lost' ? 'no connection' : state;
-    const waits = session.info.value.waits.map((wait) => `waits ${wait.hasPeer ? 'for the peer of' : 'for a peer on'} port ${wait.port} since ${wait.seconds.toFixed(1)} s`);
+    const { waits } = session.info.value, waiting = waits.map((wait) => `waits ${wait.hasPeer ? 'for the peer of' : 'for a peer on'} port ${wait.port}`);
     const failure = session.failure.value;
-    this.banner.classList.toggle('hidden', waits.length === 0 && !failure && state !== 'lost');
     this.banner.classList.toggle('bad', failure !== undefined || state === 'lost');
-    if (failure) this.banner.replaceChildren(h('div', { class: 'text' }, h('strong', {}, failure.message), this.worst(), diagnosticsList(failure.diagnostics)),
-      iconButton('close', 'Close', () => (session.failure.value = undefined), { class: 'icon-button small' }));
-    else this.banner.replaceChildren(h('div', { class: 'text' }, gone ? GONE : lost || waits.join('\n')));
+    if (failure) this.say(failure, () => [h('div', { class: 'text' }, h('strong', {}, failure.message), this.worst(), diagnosticsList(failure.diagnostics)),
+      iconButton('close', 'Close', () => (session.failure.value = undefined), { class: 'icon-button small' })]);
+    else if (lost) this.say(gone ? GONE : lost);
+    else this.say(waiting.join('\n'), () => [h('div', { class: 'text' }, ...waiting.map((words) => h('div', {}, words, h('span', { class: 'since', 'aria-hidden': 'true' }))))]);
+    this.banner.querySelectorAll('.since').forEach((since, i) => (since.textContent = ` since ${waits[i].seconds.toFixed(1)} s`));
+  }
+
+  /** Fills the banner anew only when it is about something else: what is in it may have the focus or be selected, and is read aloud. */
+  private say(about: unknown, content = (): HTMLElement[] => [h('div', { class: 'text' }, String(about))]): void {
+    if (about === this.said) return;
+    this.said = about;
+    this.banner.classList.toggle('hidden', about === '');
+    this.banner.replaceChildren(...(about === '' ? [] : content()));
   }
 
   private worst(): HTMLElement | string {

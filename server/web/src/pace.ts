@@ -10,13 +10,17 @@ export class Pace {
     this.origin = { wall, time };
   }
 
-  /** Time to step to, or nothing while the next step is not due. A simulation that is too slow is not chased. */
+  /** Time to step to, or nothing while the next step is not due. A simulation that is too slow is not chased, one that others took on not waited for. */
   next(wall: number, time: number, step: number): number | undefined {
     let target = this.origin.time + (wall - this.origin.wall) * this.speed;
     const longest = Math.max(LONGEST * this.speed, step);
     if (target - time > longest) {
       this.origin = { wall, time: time + longest };
       target = this.origin.time;
+    }
+    if (time - target > longest) {
+      this.origin = { wall, time };
+      target = time;
     }
     const due = target - time >= step * 0.5;
     return due ? Math.max(target, time + step) : undefined;

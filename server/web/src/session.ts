@@ -46,6 +46,8 @@ export interface LogEntry {
 /** Samples a second of wall time are at most so many, and at most so many bytes. */
 const RATE = 120, BYTES = 8e6;
 const RETRY_MILLISECONDS = 1500;
+/** The server has so long to end the step that is under way when a run is left. */
+const LEAVING_MILLISECONDS = 10_000;
 
 /** `until`: up to a time that was asked for. */
 export type Playing = 'no' | 'paced' | 'fast' | 'until';
@@ -81,6 +83,10 @@ export class Session implements Shown {
   private driven: Promise<void> = Promise.resolve();
   /** Steps that are asked for and not begun. */
   private owed = 0;
+  /** Newest values that wait to be written, by handle, and who is told when they are. */
+  private readonly unwritten = new Map<number, { values: number[]; written: (() => void)[] }>();
+  /** When a run was left last. */
+  private left = -Infinity;
 
   private constructor(info: SimulationInfo, readonly model: Model, readonly geometry: Geometry) {
     this.info = new Signal(info);
@@ -209,7 +215,7 @@ export class Session implements Shown {
     while (!this.ended.signal.aborted) {
       await pause(this.playing.value === 'no' ? 1000 : 400);
       try {
-        this.info.value = await look(this.name, { timeoutMs: 5000, signal: this.ended.signal });
+        await this.refresh();
         if (this.lost.value || this.behind()) await this.read();
         this.lost.value = '';
       } catch (thrown) {
@@ -223,6 +229,10 @@ export class Session implements Shown {
         }
       }
     }
+  }
+
+  private async refresh(): Promise<void> {
+    this.info.value = await look(this.name, { timeoutMs: 5000, signal: this.ended.signal });
   }
 
   /** Whether the simulation rests at a step that telemetry, which leaves some out, did not bring. */
@@ -240,13 +250,37 @@ export class Session implements Shown {
   private drive(work: (wanted: () => boolean) => Promise<void>): Promise<void> {
     const wish = ++this.wish;
     const wanted = () => this.wish === wish;
-    this.driven = this.driven.then(async () => {
+    return this.queue(async () => {
       if (!wanted()) return;
+      try {
+        await work(wanted);
+      } catch (thrown) {
+        if (wanted()) this.pause();
+        throw thrown;
+      }
+    });
+  }
+
+  /** Does it when the call that advances, if there is one, has ended. */
+  private queue(work: () => Promise<void>): Promise<void> {
+    this.driven = this.driven.then(async () => {
       this.busy = true;
-      await this.attempt(() => work(wanted));
+      await this.attempt(work);
       this.busy = false;
     });
     return this.driven;
+  }
+
+  /** Asks again, for a while, what is refused because the server still ends a run that was left. */
+  private async patiently<T>(ask: () => Promise<T>): Promise<T> {
+    for (;;) {
+      try {
+        return await ask();
+      } catch (thrown) {
+        if (failureOf(thrown).reason !== 'SIMULATION_BUSY' || performance.now() > this.left + LEAVING_MILLISECONDS) throw thrown;
+      }
+      await pause(20);
+    }
   }
 
   /** Ends a run. Steps that are asked for while another call advances are taken after it. */
@@ -256,7 +290,7 @@ export class Session implements Shown {
     this.owed += steps;
     if (waiting) return;
     await this.drive(async (wanted) => {
-      while (this.owed > 0 && wanted()) {
+      for (; this.owed > 0 && wanted(); await this.writeAll()) {
         const count = this.owed;
         this.owed = 0;
         await this.advance({ case: 'steps', value: BigInt(count) }, wanted);
@@ -278,7 +312,7 @@ export class Session implements Shown {
   private async advance(how: { case: 'steps'; value: bigint } | { case: 'untilTime'; value: number }, wanted: () => boolean): Promise<void> {
     try {
       const begun = performance.now();
-      this.done(await simulations.step({ simulation: this.name, advance: how }), begun, wanted);
+      this.done(await this.patiently(() => simulations.step({ simulation: this.name, advance: how })), begun, wanted);
       if (this.playing.value === 'no') await this.read();  // telemetry need not have this step
     } catch (thrown) {
       this.tell(failureOf(thrown));
@@ -310,8 +344,9 @@ export class Session implements Shown {
   }
 
   private async pace(wanted: () => boolean): Promise<void> {
+    await this.refresh();  // others, and a run that was left, may have gone on since
     const pace = new Pace(this.speed.value, performance.now() / 1000, this.info.value.time);
-    while (wanted()) {
+    for (; wanted(); await this.writeAll()) {
       const info = this.info.value;
       const target = pace.next(performance.now() / 1000, info.time, info.nextStepSize || this.model.step);
       if (target === undefined) await pause(8);
@@ -320,21 +355,37 @@ export class Session implements Shown {
     }
   }
 
+  /** A run that is left for values to be written goes on. */
   private async run(end: number, wanted: () => boolean): Promise<void> {
-    this.fast = new AbortController();
-    const begun = performance.now();
-    try {
-      const run = simulations.run(
-        { step: { simulation: this.name, advance: { case: 'untilTime', value: end } }, progressInterval: duration(0.2) },
-        { signal: this.fast.signal },
-      );
-      for await (const reply of run) if (reply.content.case === 'done') this.done(reply.content.value, begun, wanted);
-    } catch (thrown) {
-      const failure = failureOf(thrown);
-      if (!failure.cancelled) this.tell(failure);
+    for (let over = false; wanted() && !over; ) {
+      this.fast = new AbortController();
+      await this.writeAll();
+      try {
+        over = await this.patiently(() => this.runPiece(end, wanted, this.fast.signal));
+      } catch (thrown) {
+        if (!this.fast.signal.aborted) throw thrown;
+        await this.leave();
+      }
     }
     if (wanted()) this.pause();
     await this.read();
+  }
+
+  private async runPiece(end: number, wanted: () => boolean, signal: AbortSignal): Promise<boolean> {
+    const begun = performance.now();
+    const run = simulations.run({ step: { simulation: this.name, advance: { case: 'untilTime', value: end } }, progressInterval: duration(0.2) }, { signal });
+    for await (const reply of run) if (reply.content.case === 'done') this.done(reply.content.value, begun, wanted);
+    return true;
+  }
+
+  /** Waits, not for ever, until the server has ended the step that is under way in a run that was left. */
+  private async leave(): Promise<void> {
+    this.left = performance.now();
+    for (;;) {
+      await this.refresh();
+      if (this.info.value.state !== SimulationState.STEPPING || performance.now() > this.left + LEAVING_MILLISECONDS) return;
+      await pause(20);
+    }
   }
 
   /** `begun`: when the page asked, in milliseconds. */
@@ -371,11 +422,24 @@ export class Session implements Shown {
     this.steps.value = steps;
   }
 
-  async write(variable: VariableInfo, values: number[]): Promise<void> {
-    await this.attempt(async () => {
-      await simulations.writeVariables({ simulation: this.name, values: { handles: [variable.handle], values } });
-      await this.read();
+  /** Between two calls of the page's that advance; a run without regard to the wall clock is left for that. Ends when it is done. */
+  write({ handle }: VariableInfo, values: number[]): Promise<void> {
+    return new Promise((written) => {
+      this.unwritten.set(handle, { values, written: [...(this.unwritten.get(handle)?.written ?? []), written] });
+      this.fast.abort();
+      void this.queue(() => this.writeAll());
     });
+  }
+
+  private async writeAll(): Promise<void> {
+    for (const [handle, { values, written }] of this.unwritten) {
+      this.unwritten.delete(handle);
+      await this.attempt(async () => {
+        await this.patiently(() => simulations.writeVariables({ simulation: this.name, values: { handles: [handle], values } }));
+        await this.read();
+      });
+      for (const tell of written) tell();
+    }
   }
 
   async saveSnapshot(displayName: string): Promise<void> {
@@ -387,9 +451,8 @@ export class Session implements Shown {
 
   async restore(snapshot: Snapshot): Promise<void> {
     this.pause();
-    await this.driven;
-    await this.attempt(async () => {
-      this.info.value = told((await simulations.restoreSnapshot({ simulation: this.name, snapshot: snapshot.name })).simulation);
+    await this.queue(async () => {
+      this.info.value = told((await this.patiently(() => simulations.restoreSnapshot({ simulation: this.name, snapshot: snapshot.name }))).simulation);
       this.failure.value = undefined;
       this.stream.abort();  // what is still on its way is of a time undone
       await this.read(true);
@@ -431,7 +494,8 @@ export class Session implements Shown {
     try {
       await work();
     } catch (thrown) {
-      this.tell(failureOf(thrown));
+      const failure = failureOf(thrown);
+      if (!failure.cancelled) this.tell(failure);
     }
   }
 

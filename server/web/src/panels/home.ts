@@ -17,12 +17,21 @@ export const STATES: Record<number, string> = {
   [SimulationState.SUSPENDED]: 'suspended',
 };
 
+/** A simulation in the list. */
+interface Row {
+  element: HTMLLIElement;
+  state: HTMLElement;
+  compare: HTMLElement;
+}
+
 export class Home {
   /** The list for the left-hand side. */
   readonly list = h('ul', { class: 'list', style: 'padding:8px' });
   /** What stands in place of the scene while nothing is shown. */
   readonly welcome = h('div', { class: 'empty' });
   private readonly message = h('div', { 'aria-live': 'polite' });
+  private readonly none = h('li', { class: 'soft' }, 'No simulation yet.');
+  private readonly rows = new Map<string, Row>();
   private known: SimulationInfo[] = [];
 
   constructor(private readonly desk: Desk, private readonly open: (name: string) => void, private readonly compare: (name: string) => void) {
@@ -102,21 +111,38 @@ export class Home {
     const hint = remedy(failure);
     if (kind !== 'connection' || !this.desk.shown.value) this.welcome.classList.remove('hidden');
     const back = h('button', { type: 'button', class: 'button', onclick: () => this.welcome.classList.add('hidden') }, 'Back to the simulation');
-    this.message.replaceChildren(
+    const said = h('div', {},
       this.desk.shown.value ? back : '',
       failure.diagnostics.length === 0 ? h('div', { class: 'diagnostic' }, h('strong', {}, failure.message), hint && h('p', {}, hint)) : '',
       diagnosticsList(failure.diagnostics, files));
+    if (kind !== 'connection' || said.innerHTML !== this.message.innerHTML) this.message.replaceChildren(...said.childNodes);  // is read aloud once
   }
 
+  /** What stays in the list stays in its place: it may have the focus, or be pressed. */
   private draw(): void {
     const current = this.desk.session?.name;
-    this.list.replaceChildren(...this.known.map((info) => h('li', { class: `card${info.name === current ? ' current' : ''}` },
+    const elements = this.known.map((info) => {
+      const row = this.rows.get(info.name) ?? this.row(info), text = `${STATES[info.state] ?? 'unknown'}, ${number(info.time, 5)} s, ${info.owner}`;
+      this.rows.set(info.name, row);
+      row.element.classList.toggle('current', info.name === current);
+      row.compare.classList.toggle('hidden', !current || info.name === current);
+      if (row.state.textContent !== text) row.state.textContent = text;
+      return row.element;
+    });
+    if (elements.length === 0) elements.push(this.none);
+    for (const child of [...this.list.children]) if (!elements.includes(child as HTMLLIElement)) child.remove();
+    elements.forEach((element, place) => element !== this.list.children[place] && this.list.insertBefore(element, this.list.children[place] ?? null));
+    for (const name of this.rows.keys()) if (!this.known.some((info) => info.name === name)) this.rows.delete(name);
+  }
+
+  private row(info: SimulationInfo): Row {
+    const state = h('div', { class: 'soft' });
+    const compare = iconButton('eye', `Compare with ${info.displayName || info.name}`, () => this.compare(info.name), { class: 'icon-button small' });
+    const element = h('li', { class: 'card' },
       h('button', { type: 'button', class: 'name body', style: 'background:none;border:0;text-align:left;cursor:pointer;padding:0', onclick: () => this.open(info.name) },
-        h('div', {}, info.displayName || info.name.replace('simulations/', '')),
-        h('div', { class: 'soft' }, `${STATES[info.state] ?? 'unknown'}, ${number(info.time, 5)} s, ${info.owner}`)),
-      current && info.name !== current ? iconButton('eye', `Compare with ${info.displayName || info.name}`, () => this.compare(info.name), { class: 'icon-button small' }) : null,
-      iconButton('trash', `Delete ${info.displayName || info.name}`, () => void this.remove(info), { class: 'icon-button small' }))));
-    if (this.known.length === 0) this.list.append(h('li', { class: 'soft' }, 'No simulation yet.'));
+        h('div', {}, info.displayName || info.name.replace('simulations/', '')), state),
+      compare, iconButton('trash', `Delete ${info.displayName || info.name}`, () => void this.remove(info), { class: 'icon-button small' }));
+    return { element, state, compare };
   }
 
   private async remove(info: SimulationInfo): Promise<void> {

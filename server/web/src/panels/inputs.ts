@@ -34,16 +34,17 @@ export function inputsPanel(desk: Desk): HTMLElement {
     const count = Math.min(variable.size, 9);
     const values = new Array<number>(variable.size).fill(0);
     const fields: { slider: HTMLInputElement; field: HTMLInputElement }[] = [];
-    const unsent = new Map<number, number>();  // what samples that are on their way do not know yet
+    const unwritten = new Map<number, number>();  // what samples that are on their way do not know yet
     let timer = 0;
     const write = (k: number, value: number) => {
       if (!Number.isFinite(value)) return;
-      unsent.set(k, value);
+      unwritten.set(k, value);
       clearTimeout(timer);
-      timer = window.setTimeout(() => {
-        for (const [place, wanted] of unsent) values[place] = wanted;
-        unsent.clear();
-        void desk.session?.write(variable, [...values]);
+      timer = window.setTimeout(async () => {
+        const sent = [...unwritten];
+        for (const [place, wanted] of sent) values[place] = wanted;
+        await desk.session?.write(variable, [...values]);
+        for (const [place, wanted] of sent) if (unwritten.get(place) === wanted) unwritten.delete(place);
       }, WRITE_MILLISECONDS);
     };
     const lines = Array.from({ length: count }, (_, k) => {
@@ -66,7 +67,7 @@ export function inputsPanel(desk: Desk): HTMLElement {
       variable,
       set: (next) => next.slice(0, count).forEach((value, k) => {
         const { slider, field } = fields[k];
-        if (unsent.has(k)) return;
+        if (unwritten.has(k)) return;
         values[k] = value;
         if (document.activeElement === slider || document.activeElement === field) return;
         widen(slider, value);
