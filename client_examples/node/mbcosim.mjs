@@ -125,7 +125,7 @@ export async function call(server, client, method, request, timeout) {
 /** The same for a call of Simulations that may be repeated, as it changes nothing or has an id. The bound grows by `reconnect`. */
 async function repeated(server, method, request, timeout) {
   options(timeout); // refuses what is none
-  const left = countdown(timeout && timeout + server.reconnect);
+  const left = countdown(timeout && Math.min(timeout + server.reconnect, LONGEST));
   let end;
   for (let pause = 50; ; pause = Math.min(2 * pause, 1000)) {
     try {

@@ -6,6 +6,7 @@
 
 #include <algorithm>
 #include <charconv>
+#include <filesystem>
 #include <fstream>
 #include <sstream>
 #include <stdexcept>
@@ -98,7 +99,9 @@ void Authenticator::reload(const std::string& path) {
 Authenticator::Tokens Authenticator::read(const std::string& path) {
   check_trusted("the tokens file", path);
   std::ifstream file(path);
-  if (!file) throw std::runtime_error("cannot read the tokens file");
+  if (!file || std::filesystem::is_directory(path))
+    throw std::runtime_error("cannot read the tokens file" +
+                             std::string(file ? ": " + path + " is a folder" : ""));
   Tokens result;
   std::string line;
   for (int number = 1; std::getline(file, line); ++number) {

@@ -149,7 +149,8 @@ class Page:
                 yield from self.run_block(**block.groupdict())
         finally:
             for process in self.background:
-                os.killpg(process.pid, signal.SIGTERM)
+                with contextlib.suppress(ProcessLookupError):  # it has ended, which was told
+                    os.killpg(process.pid, signal.SIGTERM)
                 process.wait(WAIT)
 
     def run_block(self, what, detail, language, text):
