@@ -247,10 +247,11 @@ Invocation read_options(int argc, char** argv) {
          "step than there are cores")
       ->capture_default_str()
       ->check(NumberCheck::within(1, 1024));
-  app.add_option("--metrics", config.metrics, "HOST:PORT of Prometheus metrics")
+  app.add_option("--metrics", config.metrics, "HOST:PORT (IPv4) of Prometheus metrics")
       ->check(AddressCheck::of_host());
   app.add_option("--http", config.http,
-                 "HOST:PORT of the page, of calls over HTTP (Connect, gRPC-Web) and of /metrics")
+                 "HOST:PORT (IPv4) of the page, of calls over HTTP (Connect, gRPC-Web) and of "
+                 "/metrics")
       ->check(AddressCheck::of_host());
   app.add_option("--http-origin", config.http_origins,
                  "Web site under which a proxy shows this daemon: https://HOST")
