@@ -22,7 +22,6 @@
 #include "daemon/tls.h"
 #include "grpc/health/v1/health.grpc.pb.h"
 #include "host/control_group.h"
-#include "host/socket_file.h"
 #include "rpc/reflection.h"
 #include "service/coupling_service.h"
 #include "service/events_service.h"
@@ -347,11 +346,7 @@ Daemon::~Daemon() {
 }
 
 void Daemon::check_listener(const std::string& address) const {
-  if (is_unix(address)) {
-    remove_stale_socket(address.substr(kUnix.size()), SOCK_STREAM);
-    return;
-  }
-  if (config_.insecure) return;
+  if (is_unix(address) || config_.insecure) return;
   const bool tls = !config_.tls_certificate.empty();
   const bool identified = !config_.tls_client_ca.empty() || !config_.tokens_file.empty();
   if (!identified)

@@ -19,6 +19,7 @@
 #include <cstring>
 #include <stdexcept>
 
+#include "host/socket_file.h"
 #include "rpc/call_counts.h"
 #include "threads/top_frame.h"
 
@@ -172,12 +173,10 @@ Listener::Listener(const std::string& address, ConnectionCounts counts)
 Listener::~Listener() { stop(); }
 
 void Listener::bind_unix(const std::string& path) {
+  remove_stale_socket(path, SOCK_STREAM);
   sockaddr_un name{};
   name.sun_family = AF_UNIX;
-  if (path.size() >= sizeof name.sun_path)
-    throw std::runtime_error("the socket's path is too long: " + path);
   std::memcpy(name.sun_path, path.c_str(), path.size() + 1);
-  ::unlink(path.c_str());
   shm::Descriptor socket(::socket(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0));
   const mode_t old_mask = ::umask(0177);
   const bool listens =

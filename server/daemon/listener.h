@@ -37,8 +37,8 @@ struct ConnectionCounts {
 class Listener {
  public:
   using Acceptor = grpc::experimental::ExternalConnectionAcceptor;
-  /// Binds "unix:PATH", mode 0600, or "HOST:PORT"; port 0: any. A socket file is replaced. Throws
-  /// std::runtime_error.
+  /// Binds "unix:PATH", mode 0600, or "HOST:PORT"; port 0: any. A socket file on which nobody
+  /// listens is replaced. Throws std::runtime_error.
   explicit Listener(const std::string& address, ConnectionCounts counts = {});
   ~Listener();
   Listener(const Listener&) = delete;

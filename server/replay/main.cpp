@@ -1,12 +1,10 @@
 /// mbcosim-replay: `mbcosim replay` hands over to it.
 #include <grpcpp/server_builder.h>
-#include <sys/socket.h>
 
 #include <CLI/CLI.hpp>
 #include <cstdio>
 
 #include "daemon/listener.h"
-#include "host/socket_file.h"
 #include "options/address_checks.h"
 #include "options/number_checks.h"
 #include "replay/model_replay.h"
@@ -43,8 +41,6 @@ class CannotServe : public std::runtime_error {
 
 /// Throws CannotServe when the address cannot be had.
 server::Listener listener_at(const std::string& address) try {
-  if (address.compare(0, server::kUnix.size(), server::kUnix) == 0)
-    server::remove_stale_socket(address.substr(server::kUnix.size()), SOCK_STREAM);
   return server::Listener(address);
 } catch (const std::runtime_error& error) {
   throw CannotServe(error.what());

@@ -12,33 +12,6 @@
 #include "wire/convert.h"
 
 namespace mbcosim::server {
-
-void refuse_deck(const LoadReport& report) {
-  Error error;
-  error.kind = ErrorKind::deck;
-  error.diagnostics = report.diagnostics;
-  const auto first =
-      std::find_if(report.diagnostics.begin(), report.diagnostics.end(),
-                   [](const Diagnostic& d) { return d.severity == Severity::error; });
-  if (first == report.diagnostics.end()) {
-    error.message = "the deck cannot be read";
-  } else {
-    error.message = utf8(first->file + ":" + std::to_string(first->line) + ":" +
-                         std::to_string(first->column) + ": error: " + first->message);
-    constexpr std::string_view kLimit = "limit-";
-    if (first->code == "internal") error.kind = ErrorKind::internal;
-    if (first->code == "port") throw Refusal(v1::REASON_BAD_ARGUMENT, utf8(first->message));
-    if (first->code == "units")
-      throw Refusal(v1::REASON_BAD_ARGUMENT, "`units`: " + utf8(first->message));
-    if (first->code.compare(0, kLimit.size(), kLimit) == 0) {
-      error.kind = ErrorKind::limit;
-      error.reason = first->code.substr(kLimit.size());
-      std::replace(error.reason.begin(), error.reason.end(), '-', '_');
-    }
-  }
-  throw Refusal(error);
-}
-
 namespace {
 
 Session::Identity make_identity(std::string name, const v1::CreateOptions& options,

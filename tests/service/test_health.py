@@ -74,6 +74,12 @@ def test_a_second_daemon_does_not_steal_the_socket(daemon):
         server.info()
 
 
+def test_an_address_that_is_given_twice_is_refused(tmp_path):
+    address = f"unix:{tmp_path}/s"
+    done = subprocess.run([DAEMON, "--listen", address, "--listen", address], stderr=subprocess.PIPE, text=True, timeout=30 * TIME_FACTOR)
+    assert done.returncode == 4 and f"another server listens on {tmp_path}/s" in done.stderr and not (tmp_path / "s").exists()
+
+
 @pytest.mark.parametrize("mode", [0o777, 0o700])
 @pytest.mark.parametrize("program, arguments", [(DAEMON, []), (SESSIONS, ["sessions"])], ids=["daemon", "client"])
 def test_the_default_socket_is_in_a_folder_that_nobody_else_may_write(program, arguments, mode):

@@ -101,9 +101,14 @@ export class Daemon {
     return `http://127.0.0.1:${this.port}`;
   }
 
+  /** Address for gRPC. */
+  get socket(): string {
+    return `unix:${this.folder}/socket`;
+  }
+
   async start(): Promise<void> {
     const tokens = this.openSocket ? [] : ['--tokens', `${this.folder}/tokens`];
-    const child = spawn(`${BIN}/mbcosimd`, ['--listen', `unix:${this.folder}/socket`, '--http', `127.0.0.1:${this.port}`, ...tokens, ...this.options], { stdio: ['ignore', 'pipe', 'ignore'] });
+    const child = spawn(`${BIN}/mbcosimd`, ['--listen', this.socket, '--http', `127.0.0.1:${this.port}`, ...tokens, ...this.options], { stdio: ['ignore', 'pipe', 'ignore'] });
     let said = '';
     this.token = this.openSocket ? undefined : TOKEN;
     child.stdout?.on('data', (data: Buffer) => {

@@ -90,11 +90,20 @@ end: elements;
 `;
 }
 
+/** Runs `work` with a page on such a field. */
+async function withPendulums(count: number, work: (visited: Visit, view: View) => Promise<void>, change = (deck: string) => deck): Promise<void> {
+  const folder = mkdtempSync(join(tmpdir(), 'mbcosim-')), deck = join(folder, 'pendulums.mbd');
+  writeFileSync(deck, change(pendulums(count)));
+  try {
+    await withPage(browser, deck, work);
+  } finally {
+    rmSync(folder, { recursive: true });
+  }
+}
+
 describe('a thousand bodies', () => {
   test('are drawn in a few calls, where the service says', async () => {
-    const folder = mkdtempSync(join(tmpdir(), 'mbcosim-'));
-    writeFileSync(join(folder, 'pendulums.mbd'), pendulums(1000));
-    await withPage(browser, join(folder, 'pendulums.mbd'), async (visited, view) => {
+    await withPendulums(1000, async (visited, view) => {
       const { page } = visited;
       await page.getByRole('button', { name: '+10' }).click();
       await atStep(page, 10);
@@ -103,7 +112,6 @@ describe('a thousand bodies', () => {
       await page.getByRole('button', { name: 'Replay what was recorded, in a loop' }).click();
       console.log(`1000 bodies: ${(await frameRate(page, 3)).toFixed(1)} pictures a second`);
     });
-    rmSync(folder, { recursive: true });
   });
 });
 
@@ -180,9 +188,7 @@ describe('time', () => {
   });
 
   test('of a run until a given time can be stopped', async () => {
-    const folder = mkdtempSync(join(tmpdir(), 'mbcosim-'));
-    writeFileSync(join(folder, 'pendulums.mbd'), pendulums(400));
-    await withPage(browser, join(folder, 'pendulums.mbd'), async ({ page }, view) => {
+    await withPendulums(400, async ({ page }, view) => {
       await page.getByRole('spinbutton', { name: 'Run until, in seconds' }).fill('100');
       await button(page, 'Run until this time').click();
       await samplesReach(page, 0.01);
@@ -202,7 +208,6 @@ describe('time', () => {
       await button(page, 'Pause (space)').click();
       await rested(page);
     });
-    rmSync(folder, { recursive: true });
   });
 
   test('goes slower as soon as another speed is chosen', async () => {
@@ -220,9 +225,8 @@ describe('time', () => {
 
   /** A page at full speed with `count` pendulums that have far to go. */
   async function atFullSpeed(count: number, work: (visit: Visit, view: View) => Promise<void>): Promise<void> {
-    const folder = mkdtempSync(join(tmpdir(), 'mbcosim-'));
-    writeFileSync(join(folder, 'pendulums.mbd'), pendulums(count).replace('final time: 100.; time step: 0.005', 'final time: 1.e6; time step: 0.0005'));
-    await withPage(browser, join(folder, 'pendulums.mbd'), async (visited, view) => {
+    const long = (deck: string) => deck.replace('final time: 100.; time step: 0.005', 'final time: 1.e6; time step: 0.0005');
+    await withPendulums(count, async (visited, view) => {
       await button(visited.page, 'Save state').click();
       await button(visited.page, 'Restore the state at 0 s').waitFor();
       await visited.page.getByRole('combobox', { name: 'Speed' }).selectOption('Infinity');
@@ -230,8 +234,7 @@ describe('time', () => {
       await samplesReach(visited.page, 0.005);
       await work(visited, view);
       expect(await visited.page.locator('.banner').textContent()).toBe('');
-    });
-    rmSync(folder, { recursive: true });
+    }, long);
   }
 
   test('goes on slowly at once after full speed', async () => {
@@ -508,9 +511,7 @@ describe('inputs', () => {
 
 describe('inputs while the page runs', () => {
   test('are written between its steps, and it runs on', async () => {
-    const folder = mkdtempSync(join(tmpdir(), 'mbcosim-'));
-    writeFileSync(join(folder, 'pendulums.mbd'), pendulums(200));
-    await withPage(browser, join(folder, 'pendulums.mbd'), async ({ page }, view) => {
+    await withPendulums(200, async ({ page }, view) => {
       await page.locator('summary', { hasText: 'Inputs' }).click();
       const field = page.getByRole('spinbutton', { name: 'node 1.load.fx, value' });
       await field.waitFor();
@@ -531,7 +532,6 @@ describe('inputs while the page runs', () => {
       expect(await page.locator('.banner').textContent()).toBe('');
       expect(await field.inputValue()).toBe('3');
     });
-    rmSync(folder, { recursive: true });
   });
 });
 
@@ -618,17 +618,37 @@ describe('what is shown of a simulation that changes', () => {
   });
 });
 
+interface Choices {
+  /** Of the daemon, which has this folder. */
+  options?: (folder: string) => string[];
+  openSocket?: boolean;
+  /** CreateOptions of its simulation. */
+  creation?: object;
+}
+
+/** Runs `work` with a page on a pendulum of a daemon that it may end and start. */
+async function withDaemon(work: (page: Page, daemon: Daemon, simulation: string) => Promise<void>, { options, openSocket, creation }: Choices = {}): Promise<void> {
+  const folder = mkdtempSync(join(tmpdir(), 'mbcosim-'));
+  const daemon = new Daemon(folder, await freePort(), options?.(folder), openSocket);
+  try {
+    await daemon.start();
+    const simulation = await create(daemon, 'pendulum.mbd', creation);
+    const { page, close } = await visit(browser, `${daemon.origin}/?token=${daemon.token}#simulation=${encodeURIComponent(simulation)}`);
+    await shown(page);
+    await work(page, daemon, simulation);
+    await close();
+  } finally {
+    await daemon.kill();
+    rmSync(folder, { recursive: true });
+  }
+}
+
 describe('who waits for whom', () => {
   test('is told while a step waits for a peer that does not answer', async () => {
-    const folder = mkdtempSync(join(tmpdir(), 'mbcosim-'));
-    const daemon = new Daemon(folder, await freePort(), [], true);
     let peer: ChildProcess | undefined;
-    try {
-      await daemon.start();
-      const simulation = await create(daemon, 'pendulum.mbd', { ports: [{ name: 'tip', kind: 'PORT_KIND_STRUCTURAL', nodeLabels: [2] }] });
-      const { page, close } = await visit(browser, `${daemon.origin}/?token=${daemon.token}#simulation=${encodeURIComponent(simulation)}`);
-      await shown(page);
-      peer = daemon.run('spring_peer', `unix:${folder}/socket`, '--join', simulation, 'tip');
+    const ports = [{ name: 'tip', kind: 'PORT_KIND_STRUCTURAL', nodeLabels: [2] }];
+    await withDaemon(async (page, daemon, simulation) => {
+      peer = daemon.run('spring_peer', daemon.socket, '--join', simulation, 'tip');
       await page.locator('summary', { hasText: 'Events' }).click();
       await page.getByRole('log', { name: 'Events' }).getByText(/attached to port tip/).waitFor();
       peer.kill('SIGSTOP');
@@ -639,12 +659,7 @@ describe('who waits for whom', () => {
       expect(await words?.evaluate((element) => element.isConnected)).toBe(true);  // and is read aloud once
       peer.kill('SIGCONT');
       await atStep(page, 1);
-      await close();
-    } finally {
-      peer?.kill('SIGKILL');
-      await daemon.kill();
-      rmSync(folder, { recursive: true });
-    }
+    }, { openSocket: true, creation: { ports } }).finally(() => peer?.kill('SIGKILL'));
   });
 });
 
@@ -785,13 +800,7 @@ describe('a daemon that is gone', () => {
 
 describe('a daemon that is started again', () => {
   test('is found again by the page, which says what is gone and opens what is there', async () => {
-    const folder = mkdtempSync(join(tmpdir(), 'mbcosim-'));
-    const daemon = new Daemon(folder, await freePort());
-    try {
-      await daemon.start();
-      const first = await create(daemon, 'pendulum.mbd');
-      const { page, close } = await visit(browser, `${daemon.origin}/?token=${daemon.token}#simulation=${encodeURIComponent(first)}`);
-      await shown(page);
+    await withDaemon(async (page, daemon) => {
       await daemon.kill();
       await page.getByText('The daemon does not answer; trying again.').waitFor();
       await daemon.start();
@@ -802,46 +811,29 @@ describe('a daemon that is started again', () => {
       await turnTo(page, second);
       await page.getByRole('button', { name: 'One step (S)' }).click();
       await atStep(page, 1);
-      await close();
-    } finally {
-      await daemon.kill();
-      rmSync(folder, { recursive: true });
-    }
+    });
   });
 });
 
 describe('a daemon that is started again with another token', () => {
   test('lets the page no longer in, which says what to do', async () => {
-    const folder = mkdtempSync(join(tmpdir(), 'mbcosim-'));
-    const daemon = new Daemon(folder, await freePort(), [], true);
-    try {
-      await daemon.start();
-      const simulation = await create(daemon, 'pendulum.mbd');
-      const { page, close } = await visit(browser, `${daemon.origin}/?token=${daemon.token}#simulation=${encodeURIComponent(simulation)}`);
-      await shown(page);
+    await withDaemon(async (page, daemon) => {
       await daemon.kill();
       await page.getByText('The daemon does not answer; trying again.').waitFor();
       await daemon.start();
       await page.locator('.banner').getByText('Open the address that the daemon printed when it started: it has the token.').waitFor();
-      await close();
-    } finally {
-      await daemon.kill();
-      rmSync(folder, { recursive: true });
-    }
+    }, { openSocket: true });
   });
 });
 
 describe('a daemon that keeps its simulations', () => {
   /** What a page does before, a daemon that ends so, and what the page has to find. */
   async function comesBack(end: (daemon: Daemon) => Promise<void>, reload: boolean): Promise<void> {
-    const folder = mkdtempSync(join(tmpdir(), 'mbcosim-'));
-    mkdirSync(join(folder, 'state'));
-    const daemon = new Daemon(folder, await freePort(), ['--state-dir', join(folder, 'state')]);
-    try {
-      await daemon.start();
-      const simulation = await create(daemon, 'pendulum.mbd', { checkpointSteps: '1' });
-      const { page, close } = await visit(browser, `${daemon.origin}/?token=${daemon.token}#simulation=${encodeURIComponent(simulation)}`);
-      await shown(page);
+    const options = (folder: string) => {
+      mkdirSync(join(folder, 'state'));
+      return ['--state-dir', join(folder, 'state')];
+    };
+    await withDaemon(async (page, daemon) => {
       await page.getByRole('button', { name: '+10' }).click();
       await atStep(page, 10);
       const before = await scene(page);
@@ -858,11 +850,7 @@ describe('a daemon that keeps its simulations', () => {
       expect((await scene(page)).nodes).not.toEqual(before.nodes);
       await page.getByRole('button', { name: 'clamp 1', exact: true }).click();
       await page.locator('.written').getByText(/^pendulum\.mbd:\d+:\d+$/).waitFor();
-      await close();
-    } finally {
-      await daemon.kill();
-      rmSync(folder, { recursive: true });
-    }
+    }, { options, creation: { checkpointSteps: '1' } });
   }
 
   test('and is shut down in order: the page goes on where it was', () => comesBack((daemon) => daemon.end(), false));
@@ -901,10 +889,8 @@ describe('a tab that stops reading', () => {
 
   // A machine that does other things has its say in every single round; a tab that holds up the steps would have it in all of them.
   test('leaves the p99 of the steps where it was', async () => {
-    const folder = mkdtempSync(join(tmpdir(), 'mbcosim-'));
-    writeFileSync(join(folder, 'pendulums.mbd'), pendulums(400));
     let least = Infinity;
-    await withPage(browser, join(folder, 'pendulums.mbd'), async ({ page }, view) => {
+    await withPendulums(400, async ({ page }, view) => {
       const debug = await page.context().newCDPSession(page);
       await debug.send('Debugger.enable');
       for (let round = 0; round < ROUNDS && least > 1.25; ++round) {
@@ -925,7 +911,6 @@ describe('a tab that stops reading', () => {
       }
     });
     expect(least).toBeLessThan(1.25);
-    rmSync(folder, { recursive: true });
   });
 });
 
