@@ -237,9 +237,12 @@ describe('time', () => {
     }, long);
   }
 
-  test('goes on slowly at once after full speed', async () => {
+  test('at full speed waits for eigenmodes, and goes on slowly at once', async () => {
     await atFullSpeed(1, async ({ page }, view) => {
-      await samplesReach(page, 1);
+      await page.locator('summary', { hasText: 'Eigenmodes' }).click();
+      await button(page, 'Compute').click();
+      await page.getByRole('button', { name: /Hz damping/ }).first().waitFor();
+      await samplesReach(page, (await timeOf(view)) + 1);
       await page.getByRole('combobox', { name: 'Speed' }).selectOption('0.01');
       await page.waitForTimeout(1000);
       const slow = await timeOf(view);

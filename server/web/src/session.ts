@@ -83,8 +83,10 @@ export class Session implements Shown {
   private driven: Promise<void> = Promise.resolve();
   /** Steps that are asked for and not begun. */
   private owed = 0;
-  /** Newest values that wait to be written, by handle, and who is told when they are. */
-  private readonly unwritten = new Map<number, { values: number[]; written: (() => void)[] }>();
+  /** What waits for the end of a call that advances. */
+  private readonly waiting: (() => Promise<void>)[] = [];
+  /** Newest values that wait to be written, by handle. */
+  private readonly unwritten = new Map<number, number[]>();
   /** When a run was left last. */
   private left = -Infinity;
 
@@ -290,7 +292,7 @@ export class Session implements Shown {
     this.owed += steps;
     if (waiting) return;
     await this.drive(async (wanted) => {
-      for (; this.owed > 0 && wanted(); await this.writeAll()) {
+      for (; this.owed > 0 && wanted(); await this.doWaiting()) {
         const count = this.owed;
         this.owed = 0;
         await this.advance({ case: 'steps', value: BigInt(count) }, wanted);
@@ -346,7 +348,7 @@ export class Session implements Shown {
   private async pace(wanted: () => boolean): Promise<void> {
     await this.refresh();  // others, and a run that was left, may have gone on since
     const pace = new Pace(this.speed.value, performance.now() / 1000, this.info.value.time);
-    for (; wanted(); await this.writeAll()) {
+    for (; wanted(); await this.doWaiting()) {
       const info = this.info.value;
       const target = pace.next(performance.now() / 1000, info.time, info.nextStepSize || this.model.step);
       if (target === undefined) await pause(8);
@@ -359,7 +361,7 @@ export class Session implements Shown {
   private async run(end: number, wanted: () => boolean): Promise<void> {
     for (let over = false; wanted() && !over; ) {
       this.fast = new AbortController();
-      await this.writeAll();
+      await this.doWaiting();
       try {
         over = await this.patiently(() => this.runPiece(end, wanted, this.fast.signal));
       } catch (thrown) {
@@ -423,23 +425,28 @@ export class Session implements Shown {
   }
 
   /** Between two calls of the page's that advance; a run without regard to the wall clock is left for that. Ends when it is done. */
-  write({ handle }: VariableInfo, values: number[]): Promise<void> {
-    return new Promise((written) => {
-      this.unwritten.set(handle, { values, written: [...(this.unwritten.get(handle)?.written ?? []), written] });
+  private between(work: () => Promise<void>): Promise<void> {
+    return new Promise((done) => {
+      this.waiting.push(() => this.attempt(work).then(done));
       this.fast.abort();
-      void this.queue(() => this.writeAll());
+      void this.queue(() => this.doWaiting());
     });
   }
 
-  private async writeAll(): Promise<void> {
-    for (const [handle, { values, written }] of this.unwritten) {
+  private async doWaiting(): Promise<void> {
+    for (let work = this.waiting.shift(); work; work = this.waiting.shift()) await work();
+  }
+
+  /** Ends when these values, or newer ones, are written. */
+  write({ handle }: VariableInfo, values: number[]): Promise<void> {
+    this.unwritten.set(handle, values);
+    return this.between(async () => {
+      const newest = this.unwritten.get(handle);
+      if (!newest) return;
       this.unwritten.delete(handle);
-      await this.attempt(async () => {
-        await this.patiently(() => simulations.writeVariables({ simulation: this.name, values: { handles: [handle], values } }));
-        await this.read();
-      });
-      for (const tell of written) tell();
-    }
+      await this.patiently(() => simulations.writeVariables({ simulation: this.name, values: { handles: [handle], values: newest } }));
+      await this.read();
+    });
   }
 
   async saveSnapshot(displayName: string): Promise<void> {
@@ -480,11 +487,11 @@ export class Session implements Shown {
     });
   }
 
-  /** Modes about the present state, nearest to a frequency in hertz. */
+  /** Modes about the present state, nearest to a frequency in hertz. A run waits for them. */
   async eigenmodes(count: number, shift: number): Promise<Mode[]> {
     let modes: Mode[] = [];
-    await this.attempt(async () => {
-      const [eigen, names] = await Promise.all([eigenvectors(this.name, 2 * count, shift), stateNames(this.name)]);
+    await this.between(async () => {
+      const [eigen, names] = await Promise.all([this.patiently(() => eigenvectors(this.name, 2 * count, shift)), stateNames(this.name)]);
       modes = modesOf(eigen, names, this.geometry);
     });
     return modes;
