@@ -228,7 +228,7 @@ void Listener::cut() {
   std::int64_t count = 0;
   for (const auto& [fd, peer] : peers_)
     if (inode_of(fd) == peer.inode) count += ::shutdown(fd, SHUT_RDWR) == 0;
-  if (count > 0) spdlog::warn("{}: {} connections that did not end are cut", bound_, count);
+  if (count > 0) spdlog::info("{}: {} connections that did not end are cut", bound_, count);
 }
 
 void Listener::break_off(const std::string& peer) {

@@ -205,8 +205,8 @@ class Gate final {
   void close() TS_EXCLUDES(mutex_);
   /// After `close`: ends what is open still.
   void abandon() TS_EXCLUDES(mutex_);
-  /// After the server has ended. True: within that time the last call has ended, too, so that
-  /// nothing more is begun on the queue.
+  /// True: within that time the last call has ended, so that, once the server has ended, nothing
+  /// more is begun on the queue.
   bool empty_within(std::chrono::milliseconds wait) TS_EXCLUDES(mutex_);
   bool closing() const { return closing_.load(); }
   CallCounts& counts() { return counts_; }

@@ -42,7 +42,8 @@ class Daemon:
         self.log_path = os.path.join(folder, "log")
         self._log = open(self.log_path, "ab")
         self._output_path = os.path.join(folder, "output")
-        command = [program, "--listen", self.address, "--shutdown-grace", "1", *options]
+        grace = [] if "--shutdown-grace" in options else ["--shutdown-grace", "1"]
+        command = [program, "--listen", self.address, *grace, *options]
         with open(self._output_path, "wb") as output:
             self.process = subprocess.Popen(command, stdout=output, stderr=self._log, stdin=subprocess.DEVNULL, **process)
         wait_for(lambda: is_listening(self.address[len("unix:"):]) or not self.alive(), 30)

@@ -3,6 +3,7 @@ import contextlib
 import os
 import resource
 import signal
+import socket
 import subprocess
 import sys
 import threading
@@ -362,6 +363,16 @@ def test_a_client_that_stands_still_with_its_socket_full_does_not_hold_up_the_en
             reader.kill()
             reader.wait()
             reader.stdout.close()
+
+
+def test_clients_at_rest_do_not_hold_up_the_end(start_daemon):
+    """gRPC waits until they close their connections, which takes those of idle programs seconds."""
+    daemon = start_daemon("--shutdown-grace", "600")
+    with daemon.connect() as server, contextlib.closing(socket.socket(socket.AF_UNIX)) as silent:
+        server.load_text(decks.endless()).step()
+        silent.connect(daemon.address[len("unix:"):])
+        daemon.process.send_signal(signal.SIGTERM)
+        assert daemon.process.wait(20 * TIME_FACTOR) == 0
 
 
 def is_found_healthy(daemon):
