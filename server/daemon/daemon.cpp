@@ -1,6 +1,5 @@
 #include "daemon/daemon.h"
 
-#include <arpa/inet.h>
 #include <grpc/grpc.h>
 #include <grpcpp/grpcpp.h>
 #include <grpcpp/resource_quota.h>
@@ -22,6 +21,7 @@
 #include "daemon/tls.h"
 #include "grpc/health/v1/health.grpc.pb.h"
 #include "host/control_group.h"
+#include "host/loopback.h"
 #include "rpc/reflection.h"
 #include "service/coupling_service.h"
 #include "service/events_service.h"
@@ -36,14 +36,6 @@ namespace mbcosim::server {
 namespace {
 
 bool is_unix(const std::string& address) { return address.compare(0, kUnix.size(), kUnix) == 0; }
-
-bool is_loopback(const std::string& address) {
-  const std::string host = address.substr(0, address.rfind(':'));
-  in_addr number{};
-  const bool in_loopback_net =
-      ::inet_pton(AF_INET, host.c_str(), &number) == 1 && (ntohl(number.s_addr) >> 24) == 127;
-  return host == "localhost" || host == "[::1]" || in_loopback_net;
-}
 
 /// As many descriptors as the system grants.
 void raise_descriptor_limit() {

@@ -7,6 +7,7 @@
 #include <latch>
 #include <stdexcept>
 
+#include "host/loopback.h"
 #include "http/admission.h"
 #include "http/connection.h"
 #include "http/crowd.h"
@@ -32,8 +33,6 @@ std::string numeric(const std::string& address) {
   const std::string host = address.substr(0, colon);
   return (host == "localhost" ? "127.0.0.1" : host) + address.substr(colon);
 }
-
-bool is_loopback(const std::string& address) { return address.compare(0, 4, "127.") == 0; }
 
 /// civetweb's own lines: what clients send that is no request.
 int log_message(const mg_connection*, const char* message) {

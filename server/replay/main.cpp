@@ -5,6 +5,7 @@
 #include <cstdio>
 
 #include "daemon/listener.h"
+#include "host/loopback.h"
 #include "options/address_checks.h"
 #include "options/number_checks.h"
 #include "replay/model_replay.h"
@@ -71,9 +72,7 @@ int run_server(const std::string& address, const std::vector<v1::RecordEntry>& r
 }
 
 bool is_local(const std::string& address) {
-  for (const char* prefix : {"unix:", "127.0.0.1:", "localhost:", "[::1]:"})
-    if (address.rfind(prefix, 0) == 0) return true;
-  return false;
+  return address.rfind("unix:", 0) == 0 || server::is_loopback(address);
 }
 
 }  // namespace

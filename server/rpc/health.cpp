@@ -1,5 +1,7 @@
 #include "rpc/health.h"
 
+#include <optional>
+
 #include "grpc/health/v1/health.pb.h"
 #include "rpc/methods.h"
 
@@ -8,6 +10,9 @@ namespace {
 
 using grpc::health::v1::HealthCheckRequest;
 using grpc::health::v1::HealthCheckResponse;
+
+/// "ipv4:127.0.0.1" of "ipv4:127.0.0.1:40000", "unix" of sockets in files.
+std::string host_of(const std::string& peer) { return peer.substr(0, peer.rfind(':')); }
 
 }  // namespace
 
@@ -49,9 +54,10 @@ class Health::Watch final : public Handler {
   void on_message(Exchange& exchange, grpc::ByteBuffer message) override {
     HealthCheckRequest request;
     parse(exchange.memory(), message, &request, nullptr);
+    if (!place_.emplace(health_.places_, host_of(exchange.peer())).held())
+      throw limit_refusal("health_watchers", kWatchersOfHost,
+                          "the server's health is watched by many");
     Guard guard(health_.mutex_);
-    if (health_.watchers_.size() >= kWatchers)
-      throw limit_refusal("health_watchers", kWatchers, "the server's health is watched by many");
     exchange_ = &exchange;
     service_ = request.service();
     health_.watchers_.insert(this);
@@ -68,6 +74,7 @@ class Health::Watch final : public Handler {
   Health& health_;
   Exchange* exchange_ = nullptr;
   std::string service_;
+  std::optional<Place> place_;
 };
 
 void Health::add_to(Gate& gate, bool open) {

@@ -7,13 +7,15 @@
 #include <vector>
 
 #include "rpc/exchange.h"
+#include "rpc/places.h"
 
 namespace mbcosim::server {
 
 /// Thread-safe. Outlives the gate's server.
 class Health {
  public:
-  static constexpr int kWatchers = 256;  ///< at once, of all callers
+  /// At once, of all callers and of those on one machine, who need not say who they are.
+  static constexpr int kWatchers = 1024, kWatchersOfHost = kWatchers / 4;
 
   /// `services`: full names, besides "" for the server.
   explicit Health(std::vector<std::string> services)
@@ -33,6 +35,7 @@ class Health {
   grpc::ByteBuffer answer(const std::string& service) const TS_REQUIRES(mutex_);
 
   const std::set<std::string> services_;
+  Places places_{kWatchersOfHost, kWatchers};  ///< of watchers, by host
   mutable Mutex mutex_;
   bool serving_ TS_GUARDED_BY(mutex_) = true;
   std::set<Watch*> watchers_ TS_GUARDED_BY(mutex_);

@@ -47,7 +47,7 @@ ARROWS = {
                        "shared_memory", "mbdyn"},
     "server/client": {"mbcosim", "shared_memory", "threads", "wire", "host"},
     "server/shared_memory": {"threads", "host"},
-    "server/http": {"service", "rpc", "threads", "wire", "mbcosim"},
+    "server/http": {"host", "service", "rpc", "threads", "wire", "mbcosim"},
     "server/view": {"client", "options"},
     "server/reach": {"options", "client", "files"},
     "server/sessions": {"reach", "client", "durable"},

@@ -1,6 +1,7 @@
 """Malice that once took the daemon down or locked others out: it goes on, and so do they."""
 import contextlib
 import os
+import re
 import resource
 import signal
 import socket
@@ -268,6 +269,36 @@ def test_health_asks_for_credentials_on_request_only(guarded, asks):
         assert caught.value.code() == grpc.StatusCode.UNAUTHENTICATED
         check = channel.unary_unary("/grpc.health.v1.Health/Check", request_serializer=bytes, response_deserializer=bytes)
         assert check(b"", metadata=bearer("eve"), timeout=10) == b"\x08\x01"
+
+
+def test_who_watches_health_from_one_machine_leaves_places_to_others(guarded):
+    """Nobody asks who they are."""
+    daemon = guarded("--listen", "127.0.0.1:0")
+    wait_for(lambda: "listening on 127.0.0.1:" in daemon.log())
+    address = re.search(r"listening on (127\.0\.0\.1:\d+)", daemon.log()).group(1)
+
+    def watch(channel):
+        call = channel.unary_stream("/grpc.health.v1.Health/Watch", request_serializer=bytes, response_deserializer=bytes)
+        stream = call(b"", timeout=60 * TIME_FACTOR)
+        assert next(stream) == b"\x08\x01"
+        return stream
+
+    with contextlib.ExitStack() as stack:
+        channels = [stack.enter_context(grpc.insecure_channel(address, [("grpc.use_local_subchannel_pool", 1)])) for _ in range(8)]
+        streams = [watch(channels[k % 8]) for k in range(256)]
+        with pytest.raises(grpc.RpcError) as caught:
+            watch(channels[0])
+        assert caught.value.code() == grpc.StatusCode.RESOURCE_EXHAUSTED
+        watch(stack.enter_context(grpc.insecure_channel(daemon.address))).cancel()
+        streams.pop().cancel()
+        wait_for(lambda: is_watched(watch, channels[1]))
+
+
+def is_watched(watch, channel):
+    try:
+        return watch(channel)
+    except grpc.RpcError:
+        return False
 
 
 def test_one_identity_gets_half_of_the_simulations(guarded):
