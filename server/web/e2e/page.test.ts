@@ -646,6 +646,14 @@ async function withDaemon(work: (page: Page, daemon: Daemon, simulation: string)
   }
 }
 
+test('the list has all simulations, though the daemon tells them in pages', async () => {
+  await withDaemon(async (page, daemon) => {
+    for (let i = 0; i < 104; ++i) await create(daemon, 'pendulum.mbd');
+    await page.getByRole('tab', { name: 'Simulations' }).click();
+    await until(page, () => document.querySelectorAll('.left .list li').length === 105, undefined);
+  }, { options: () => ['--limit-sessions', '105'], openSocket: true });
+});
+
 describe('who waits for whom', () => {
   test('is told while a step waits for a peer that does not answer', async () => {
     let peer: ChildProcess | undefined;

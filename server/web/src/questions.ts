@@ -27,6 +27,13 @@ async function* pages<Page extends { nextPageToken: string }>(ask: (pageToken: s
   } while (token !== '');
 }
 
+/** All simulations that the reader may see, in the order of creation. */
+export async function listSimulations(): Promise<SimulationInfo[]> {
+  const all: SimulationInfo[] = [];
+  for await (const page of pages((pageToken) => simulations.listSimulations({ pageSize: 1000, pageToken }))) all.push(...page.simulations);
+  return all;
+}
+
 export async function describe(simulation: string): Promise<ModelDescription> {
   const whole = create(ModelDescriptionSchema);
   for await (const { model } of pages((pageToken) => simulations.describeSimulation({ simulation, pageToken }))) {

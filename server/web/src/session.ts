@@ -491,7 +491,7 @@ export class Session implements Shown {
   async eigenmodes(count: number, shift: number): Promise<Mode[]> {
     let modes: Mode[] = [];
     await this.between(async () => {
-      const [eigen, names] = await Promise.all([this.patiently(() => eigenvectors(this.name, 2 * count, shift)), stateNames(this.name)]);
+      const [eigen, names] = await this.patiently(() => Promise.all([eigenvectors(this.name, 2 * count, shift), stateNames(this.name)]));
       modes = modesOf(eigen, names, this.geometry);
     });
     return modes;

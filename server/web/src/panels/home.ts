@@ -4,6 +4,7 @@ import type { Desk } from '../desk';
 import { h, icon, iconButton } from '../dom';
 import { number } from '../format';
 import { SimulationState, type SimulationInfo } from '../gen/mbcosim/v1/simulations_pb';
+import { listSimulations } from '../questions';
 import { chosenFiles, droppedFiles, mainFiles, type NamedFile } from '../upload';
 import { diagnosticsList } from './diagnostics';
 
@@ -97,7 +98,7 @@ export class Home {
 
   async refresh(): Promise<SimulationInfo[]> {
     try {
-      this.known = (await simulations.listSimulations({})).simulations;
+      this.known = await listSimulations();
       if (this.message.dataset.kind === 'connection') this.message.replaceChildren();
       this.draw();
     } catch (thrown) {
