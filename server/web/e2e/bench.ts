@@ -236,6 +236,25 @@ export async function visit(browser: Browser, address: string, options: { width?
   return { page, faults, close: () => context.close() };
 }
 
+/** The address in another tab of the browser, once a simulation is on show. */
+export async function newTab(page: Page, address: string): Promise<Page> {
+  const tab = await page.context().newPage();
+  tab.setDefaultTimeout(20_000 * FACTOR);
+  await tab.goto(await prepared(tab, address));
+  await shown(tab);
+  return tab;
+}
+
+/** Tells the page that nobody sees its tab. */
+export async function hide(page: Page): Promise<void> {
+  await page.evaluate(() => Object.defineProperty(document, 'hidden', { get: () => true }));
+}
+
+/** Waits until samples come to the page by a stream. */
+export function follows(page: Page): Promise<void> {
+  return until(page, () => (window as unknown as Inside).mbcosim.desk.session?.following === true, undefined);
+}
+
 /** Runs `work` with a daemon of its own and a page on it; no error may be left in the console. */
 export async function withPage(browser: Browser, deck: string, work: (visit: Visit, view: View) => Promise<void>, options?: Parameters<typeof visit>[2]): Promise<void> {
   const view = await View.start(deck);
@@ -260,7 +279,7 @@ interface Inside {
         model: { variables: { name: string; handle: number }[] };
         recording: { samples: { step: number; time: number; layout: { offset(handle: number): number | undefined }; values: Float64Array }[] };
       } };
-      session?: { name: string; playing: { value: string }; busy: boolean };
+      session?: { name: string; playing: { value: string }; busy: boolean; following: boolean };
       sample?: { step: number; time: number };
       calm: { value: number };
     };

@@ -6,13 +6,16 @@ import { createRequire } from 'node:module';
 import { tmpdir } from 'node:os';
 import { dirname, join } from 'node:path';
 import { afterAll, beforeAll, describe, expect, test } from 'vitest';
-import { ask, atStep, create, curvesDrawn, Daemon, decks, drawCalls, drawnLayers, FACTOR, frameRate, freePort, launch, MODELS, moveSliderUnderSample, picture, recorded, rested, samplesHave, samplesReach, scene, shown, turnTo, until, View, visit, withPage, type Visit } from './bench';
+import { ask, atStep, create, curvesDrawn, Daemon, decks, drawCalls, drawnLayers, FACTOR, follows, frameRate, freePort, hide, launch, MODELS, moveSliderUnderSample, newTab, picture, recorded, rested, samplesHave, samplesReach, scene, shown, turnTo, until, View, visit, withPage, type Visit } from './bench';
 
 let browser: Browser;
 beforeAll(async () => {
   browser = await launch();
 });
 afterAll(() => browser?.close());
+
+const button = (page: Page, name: string) => page.getByRole('button', { name });
+const timeOf = async (view: View) => (await view.read([])).time;
 
 /** Do the scene's node matrices equal what the service reads? */
 async function expectSceneOf(visited: Visit, view: View, simulation = view.simulation): Promise<void> {
@@ -171,9 +174,6 @@ describe('time', () => {
       expect((await view.read([])).time).toBeCloseTo(0.25, 9);
     });
   });
-
-  const button = (page: Page, name: string) => page.getByRole('button', { name });
-  const timeOf = async (view: View) => (await view.read([])).time;
 
   test('is run until a given time, at once, while it runs by the wall clock', async () => {
     await withPage(browser, 'pendulum.mbd', async ({ page }, view) => {
@@ -434,6 +434,26 @@ describe('several readers', () => {
       await until(visited.page, (wanted) => ((window as unknown as { mbcosim: { desk: { sample: { step: number } } } }).mbcosim.desk.sample.step >= wanted), 30);
       expect(other.faults).toEqual([]);
       await other.close();
+    });
+  });
+
+  test('in many tabs share the connections that a browser has for a server', async () => {
+    await withPage(browser, 'pendulum.mbd', async ({ page }, view) => {
+      const tabs = [page];
+      await create(view, 'heavy_top.mbd');
+      await page.getByRole('tab', { name: 'Simulations' }).click();
+      await button(page, 'Compare with heavy_top.mbd').click();
+      while (tabs.length < 5) tabs.push(await newTab(page, view.address));
+      for (const [k, tab] of tabs.entries()) {
+        await button(tab, 'One step (S)').click();
+        await atStep(tab, k + 1);
+      }
+      const last = tabs[4];
+      await button(last, 'Run (space)').click();
+      await samplesReach(last, (await timeOf(view)) + 0.1);
+      await button(last, 'Pause (space)').click();
+      for (const tab of tabs.slice(0, 4)) await hide(tab);
+      await follows(last);
     });
   });
 });

@@ -1,4 +1,5 @@
 /** A simulation on the screen: what is known of it, what was seen of it, and what can be done with it. */
+import { timestampDate } from '@bufbuild/protobuf/wkt';
 import { events, failureOf, remedy, simulations, telemetry, type Failure } from './api';
 import { describe, eigenvectors, look, stateNames, told } from './questions';
 import { tell } from './events';
@@ -10,6 +11,7 @@ import { loadGeometry } from './load_geometry';
 import { modelOf, type Model, type VariableInfo } from './model';
 import { modesOf, type Mode } from './modes';
 import { Pace } from './pace';
+import { pause, placeToFollow, takePlace, type Place } from './places';
 import { Layout, Recording, type Sample } from './recording';
 import { newRequestId } from './requests';
 import { Signal } from './signal';
@@ -72,6 +74,9 @@ export class Session implements Shown {
   private readonly wanted = new Map<number, VariableInfo>();
   private readonly ended = new AbortController();
   private stream = new AbortController();
+  private eventStream = new AbortController();
+  /** Whether samples come by a stream. Otherwise they are read now and then. */
+  private following = false;
   private fast = new AbortController();
   /** Step of the last sample of the stream. */
   private streamed = -1;
@@ -87,6 +92,8 @@ export class Session implements Shown {
   private readonly waiting: (() => Promise<void>)[] = [];
   /** Newest values that wait to be written, by handle. */
   private readonly unwritten = new Map<number, number[]>();
+  private snapshotsChanged = false;
+  private snapshotsRead?: Promise<void>;
   /** When a run was left last. */
   private left = -Infinity;
 
@@ -131,6 +138,7 @@ export class Session implements Shown {
     this.pause();
     this.ended.abort();
     this.stream.abort();
+    this.eventStream.abort();
   }
 
   // ---- what is seen
@@ -164,9 +172,12 @@ export class Session implements Shown {
   }
 
   private async follow(): Promise<void> {
-    while (!this.ended.signal.aborted) {
+    for (;;) {
+      const place = await placeToFollow('samples', () => !this.ended.signal.aborted, () => this.stream.abort());
+      if (!place) return;
       this.stream = new AbortController();
       this.streamed = -1;
+      this.following = true;
       const layout = this.layout;
       try {
         const batches = telemetry.subscribe(
@@ -178,26 +189,34 @@ export class Session implements Shown {
       } catch (thrown) {
         if (this.ended.signal.aborted) return;
         if (!this.stream.signal.aborted) await pause(RETRY_MILLISECONDS);
+      } finally {
+        this.following = false;
+        place.release();
       }
     }
   }
 
-  /** Follows what happens to the simulation, whoever makes it happen. */
+  /** Follows what happens to the simulation, whoever makes it happen; begins with what the server knows of before. */
   private async watch(): Promise<void> {
-    let journal = '', afterSequence: bigint | undefined;
-    while (!this.ended.signal.aborted) {
+    let journal = '', afterSequence = 0n;
+    for (;;) {
+      const place = await placeToFollow('events', () => !this.ended.signal.aborted, () => this.eventStream.abort());
+      if (!place) return;
+      this.eventStream = new AbortController();
       try {
-        for await (const event of events.watchEvents({ simulation: this.name, journal, afterSequence }, { signal: this.ended.signal })) {
+        for await (const event of events.watchEvents({ simulation: this.name, journal, afterSequence }, { signal: this.eventStream.signal })) {
           if (event.content.case === 'started') journal = event.content.value.journal;
           else if (event.content.case === 'snapshot') void this.refreshSnapshots();
-          if (event.sequence !== undefined) afterSequence = event.sequence;
-          const told = tell(event);
-          if (told) this.note(told.text, told.level);
+          const told = event.content.case === 'missed' && afterSequence === 0n ? undefined : tell(event);
+          if (told) this.note(told.text, told.level, event.time && timestampDate(event.time));
+          afterSequence = event.sequence ?? afterSequence;
         }
         return;  // the simulation is deleted
       } catch {
         if (this.ended.signal.aborted) return;
-        await pause(RETRY_MILLISECONDS);
+        if (!this.eventStream.signal.aborted) await pause(RETRY_MILLISECONDS);
+      } finally {
+        place.release();
       }
     }
   }
@@ -237,10 +256,11 @@ export class Session implements Shown {
     this.info.value = await look(this.name, { timeoutMs: 5000, signal: this.ended.signal });
   }
 
-  /** Whether the simulation rests at a step that telemetry, which leaves some out, did not bring. */
+  /** Whether the simulation is at a step that no stream will bring: streams leave some out. */
   private behind(): boolean {
     const { state, step } = this.info.value;
-    return state !== SimulationState.STEPPING && this.playing.value === 'no' && Number(step) !== this.recording.last?.step;
+    const rests = state !== SimulationState.STEPPING && this.playing.value === 'no';
+    return (rests || !this.following) && Number(step) !== this.recording.last?.step;
   }
 
   // ---- what is done
@@ -315,7 +335,7 @@ export class Session implements Shown {
     try {
       const begun = performance.now();
       this.done(await this.patiently(() => simulations.step({ simulation: this.name, advance: how })), begun, wanted);
-      if (this.playing.value === 'no') await this.read();  // telemetry need not have this step
+      if (this.playing.value === 'no' || !this.following) await this.read();  // telemetry need not have this step
     } catch (thrown) {
       this.tell(failureOf(thrown));
       if (wanted()) this.pause();
@@ -357,8 +377,29 @@ export class Session implements Shown {
     }
   }
 
-  /** A run that is left for values to be written goes on. */
   private async run(end: number, wanted: () => boolean): Promise<void> {
+    const place = await this.placeToRun(wanted);
+    if (!place) return;
+    try {
+      await this.runOn(end, wanted);
+    } finally {
+      place.release();
+    }
+  }
+
+  private async placeToRun(wanted: () => boolean): Promise<Place | undefined> {
+    for (let told = false; wanted(); await pause(200)) {
+      const place = await takePlace('run');
+      if (place) return place;
+      if (!told) this.note('waits until a run in another tab ends');
+      told = true;
+      await this.doWaiting();
+    }
+    return undefined;
+  }
+
+  /** A run that is left for values to be written goes on. */
+  private async runOn(end: number, wanted: () => boolean): Promise<void> {
     for (let over = false; wanted() && !over; ) {
       this.fast = new AbortController();
       await this.doWaiting();
@@ -481,10 +522,20 @@ export class Session implements Shown {
     await this.refreshSnapshots();
   }
 
-  async refreshSnapshots(): Promise<void> {
-    await this.attempt(async () => {
-      this.snapshots.value = (await simulations.listSnapshots({ simulation: this.name })).snapshots;
-    });
+  /** However often it is asked for meanwhile, they are read once more. */
+  refreshSnapshots(): Promise<void> {
+    this.snapshotsChanged = true;
+    this.snapshotsRead ??= this.readSnapshots().finally(() => (this.snapshotsRead = undefined));
+    return this.snapshotsRead;
+  }
+
+  private async readSnapshots(): Promise<void> {
+    while (this.snapshotsChanged) {
+      this.snapshotsChanged = false;
+      await this.attempt(async () => {
+        this.snapshots.value = (await simulations.listSnapshots({ simulation: this.name })).snapshots;
+      });
+    }
   }
 
   /** Modes about the present state, nearest to a frequency in hertz. A run waits for them. */
@@ -511,16 +562,12 @@ export class Session implements Shown {
     this.note(failure.message, 'error');
   }
 
-  note(text: string, level: 'info' | 'error' = 'info'): void {
-    this.log.value = [...this.log.value.slice(-199), { wall: new Date(), text, level }];
+  note(text: string, level: 'info' | 'error' = 'info', wall = new Date()): void {
+    this.log.value = [...this.log.value.slice(-199), { wall, text, level }];
   }
 }
 
 /** Wall time between samples, in seconds, so that the page never slows a run. */
 function shortestInterval({ width }: Layout): number {
   return Math.max(1 / RATE, (width * Float64Array.BYTES_PER_ELEMENT) / BYTES);
-}
-
-function pause(milliseconds: number): Promise<void> {
-  return new Promise((resolve) => setTimeout(resolve, milliseconds));
 }
