@@ -14,14 +14,15 @@
 #include <cstring>
 #include <future>
 #include <latch>
+#include <limits>
 #include <system_error>
 #include <thread>
 #include <vector>
 
 #include "daemon/tls.h"
 #include "grpc/health/v1/health.grpc.pb.h"
+#include "host/addresses.h"
 #include "host/control_group.h"
-#include "host/loopback.h"
 #include "rpc/reflection.h"
 #include "service/coupling_service.h"
 #include "service/events_service.h"
@@ -36,6 +37,12 @@ namespace mbcosim::server {
 namespace {
 
 bool is_unix(const std::string& address) { return address.compare(0, kUnix.size(), kUnix) == 0; }
+
+/// Connections with TLS of one source, so that they take an eighth of the memory.
+std::int64_t most_handshakes(const MemoryBudget& memory) {
+  constexpr std::int64_t kOfOne = 80 << 10;  // bytes, as measured
+  return std::max<std::int64_t>(64, memory.most() / 8 / kOfOne);
+}
 
 /// As many descriptors as the system grants.
 void raise_descriptor_limit() {
@@ -271,8 +278,11 @@ void Daemon::listen() {
   std::vector<std::unique_ptr<Listener::Acceptor>> acceptors;
   for (const std::string& address : config_.listen) {
     listeners_.push_back(std::make_unique<Listener>(
-        address, ConnectionCounts{[this] { metrics_.count_dropped_connection(); },
-                                  [this] { metrics_.count_broken_off_connection(); }}));
+        address,
+        ConnectionCounts{[this] { metrics_.count_dropped_connection(); },
+                         [this] { metrics_.count_broken_off_connection(); }},
+        certificate_ && !is_unix(address) ? most_handshakes(budgets_.all())
+                                          : std::numeric_limits<std::int64_t>::max()));
     acceptors.push_back(builder.experimental().AddExternalConnectionAcceptor(
         grpc::ServerBuilder::experimental_type::ExternalConnectionType::FROM_FD,
         credentials_for(address)));

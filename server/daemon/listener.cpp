@@ -19,6 +19,7 @@
 #include <cstring>
 #include <stdexcept>
 
+#include "host/addresses.h"
 #include "host/socket_file.h"
 #include "rpc/call_counts.h"
 #include "threads/top_frame.h"
@@ -46,15 +47,6 @@ std::int64_t most_descriptors() {
   return ::getrlimit(RLIMIT_NOFILE, &limit) == 0 ? static_cast<std::int64_t>(limit.rlim_cur) : 1024;
 }
 
-/// An address of a host as a source: those of one network of version 6 are one host's.
-void mask(sockaddr_storage& name) {
-  if (name.ss_family != AF_INET6) return;
-  in6_addr& address = reinterpret_cast<sockaddr_in6&>(name).sin6_addr;
-  constexpr std::size_t kNetwork = 8;  // bytes
-  if (!IN6_IS_ADDR_V4MAPPED(&address))
-    std::memset(&address.s6_addr[kNetwork], 0, sizeof address - kNetwork);
-}
-
 /// Its number.
 std::string host_of(const sockaddr_storage& name, socklen_t size) {
   char text[NI_MAXHOST] = "";
@@ -74,7 +66,7 @@ std::string source_of(int fd) {
     ::getsockopt(fd, SOL_SOCKET, SO_PEERCRED, &process, &length);
     return "process " + std::to_string(process.pid);
   }
-  mask(name);
+  if (name.ss_family == AF_INET6) keep_network(reinterpret_cast<sockaddr_in6&>(name).sin6_addr);
   return host_of(name, size);
 }
 
@@ -153,9 +145,10 @@ shm::Descriptor listen_on(const addrinfo& info, bool both_families) {
 
 }  // namespace
 
-Listener::Listener(const std::string& address, ConnectionCounts counts)
+Listener::Listener(const std::string& address, ConnectionCounts counts, std::int64_t most_of_source)
     : bound_(address),
       counts_(std::move(counts)),
+      most_of_source_(most_of_source),
       reserve_(open_reserve()),
       wake_(::eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK)) {
   if (is_unix(address)) {
@@ -370,8 +363,9 @@ void Listener::forget_who_has_gone() {
 
 bool Listener::has_room(const std::string& source, std::int64_t free) const {
   constexpr std::int64_t kShare = 3;
-  const auto alike = alike_.find(source);
-  return kShare * (alike == alike_.end() ? 0 : alike->second) < free;
+  const auto found = alike_.find(source);
+  const std::int64_t alike = found == alike_.end() ? 0 : found->second;
+  return kShare * alike < free && alike < most_of_source_;
 }
 
 // Without this the client would wait, and this thread would spin.
@@ -390,7 +384,9 @@ void Listener::tell_dropped() {
   counts_.dropped();
   std::int64_t missed = 0;
   if (drops_.pass(Rate::Clock::now(), &missed))
-    spdlog::warn("{}: connections are dropped: too few file descriptors are free", bound_);
+    spdlog::warn(
+        "{}: connections are dropped: too few file descriptors are free, or their source has many",
+        bound_);
 }
 
 void Listener::tell_broken_off(const std::string& source) {

@@ -8,6 +8,7 @@
 #include <chrono>
 #include <deque>
 #include <functional>
+#include <limits>
 #include <map>
 #include <memory>
 #include <string>
@@ -33,13 +34,16 @@ struct ConnectionCounts {
 /// the process has no file descriptor left. Here the connection is dropped then, the last few
 /// descriptors are kept for files, and one source (an address, a process of this host) has at most
 /// a third as many as are free: also while several take what they can, a probe still comes in.
+/// With TLS each takes memory that no budget counts, before it has shown any credentials: there one
+/// source has at most as many as a part of the memory holds.
 /// gRPC takes its time for a connection, in the thread that hands it over: sources take turns.
 class Listener {
  public:
   using Acceptor = grpc::experimental::ExternalConnectionAcceptor;
   /// Binds "unix:PATH", mode 0600, or "HOST:PORT"; port 0: any. A socket file on which nobody
   /// listens is replaced. Throws std::runtime_error.
-  explicit Listener(const std::string& address, ConnectionCounts counts = {});
+  explicit Listener(const std::string& address, ConnectionCounts counts = {},
+                    std::int64_t most_of_source = std::numeric_limits<std::int64_t>::max());
   ~Listener();
   Listener(const Listener&) = delete;
   Listener& operator=(const Listener&) = delete;
@@ -78,6 +82,7 @@ class Listener {
 
   std::string bound_, path_;
   const ConnectionCounts counts_;
+  const std::int64_t most_of_source_;
   std::vector<shm::Descriptor> sockets_;
   shm::Descriptor reserve_;  ///< given up for a moment to drop a connection
   shm::Descriptor wake_;     ///< of the thread's wait, when somebody is to be broken off

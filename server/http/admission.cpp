@@ -47,12 +47,35 @@ std::string this_host() {
   return ::gethostname(name.data(), name.size() - 1) == 0 ? lower(name.data()) : "localhost";
 }
 
+constexpr std::string_view kHttp = "http://", kHttps = "https://";
+
+bool begins(std::string_view text, std::string_view with) {
+  return text.substr(0, with.size()) == with;
+}
+
+/// As browsers name it: they leave out the port that goes without saying.
+std::string as_named(const std::string& origin) {
+  std::string name = lower(origin);
+  const std::string_view usual = begins(name, kHttps) ? ":443" : ":80";
+  if (name.size() > usual.size() &&
+      name.compare(name.size() - usual.size(), usual.size(), usual) == 0)
+    name.resize(name.size() - usual.size());
+  return name;
+}
+
+std::string host_of_origin(const std::string& origin) {
+  return origin.substr(origin.find("://") + 3);
+}
+
 }  // namespace
 
 void check_origins(const std::vector<std::string>& origins) {
   for (const std::string& origin : origins) {
-    const std::size_t scheme = origin.find("://");
-    if (scheme != std::string::npos && origin.find('/', scheme + 3) == std::string::npos) continue;
+    const std::string name = lower(origin);
+    const bool known = begins(name, kHttp) || begins(name, kHttps);
+    const std::string host = known ? host_of_origin(as_named(origin)) : "";
+    if (!host.empty() && host.front() != ':' && host.find_first_of("/?#@ ") == std::string::npos)
+      continue;
     throw std::runtime_error("--http-origin \"" + origin +
                              "\" is not of the form https://HOST or https://HOST:PORT");
   }
@@ -75,9 +98,10 @@ Admission::Admission(const Authenticator& authenticator, const std::string& addr
     origins_.insert("http://" + name.substr(0, name.rfind(':')));
   }
   for (const std::string& origin : origins) {
-    const std::size_t scheme = origin.find("://");
-    origins_.insert(lower(origin));
-    hosts_.insert(lower(origin.substr(scheme + 3)));
+    const std::string name = as_named(origin);
+    origins_.insert(name);
+    hosts_.insert(host_of_origin(name));
+    hosts_.insert(host_of_origin(lower(origin)));
   }
   if (!authenticator_.needs_token()) startup_token_ = random_token();
   cookie_name_ = "mbcosim-" + port_;

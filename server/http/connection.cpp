@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <array>
 #include <atomic>
+#include <cerrno>
 #include <charconv>
 #include <ctime>
 
@@ -21,8 +22,7 @@ constexpr std::size_t kPiece = 1 << 13;  // bytes; civetweb's threads have stack
 // port. One peer may have connections to other ports of the daemon, too.
 int find_socket(const mg_request_info& info) {
   const Endpoint wanted{info.remote_addr, info.remote_port};
-  return find_descriptor(
-      [&](int fd) { return peer_of(fd) == wanted && local_of(fd).port == info.server_port; });
+  return http::find_socket(info.server_port, [&](int fd) { return peer_of(fd) == wanted; });
 }
 
 // civetweb would write the date by gmtime, whose result all threads share.
@@ -56,15 +56,8 @@ class Head {
     if (!keep) mg_disable_connection_keep_alive(raw_);
     add("Connection", keep ? "keep-alive" : "close");
   }
-  /// With the body, in one piece unless it is long.
-  void send(std::string_view body = {}) {
-    constexpr std::size_t kTogether = 1 << 16;  // bytes
-    text_.append("\r\n");
-    const bool together = body.size() <= kTogether;
-    if (together) text_.append(body);
-    mg_write(raw_, text_.data(), text_.size());
-    if (!together) mg_write(raw_, body.data(), body.size());
-  }
+  /// Nothing can be added after it.
+  std::string& end() { return text_.append("\r\n"); }
 
  private:
   mg_connection* raw_;
@@ -135,7 +128,8 @@ int answer_malformed(mg_connection* raw, int status, const char* message) {
   Head head(raw, status, kPlainText);
   head.add("Content-Length", std::to_string(body.size()));
   head.keep_connection(false);
-  head.send(body);
+  const std::string& answer = head.end().append(body);
+  mg_write(raw, answer.data(), answer.size());
   return 0;
 }
 
@@ -179,6 +173,18 @@ std::string_view Connection::cookie(std::string_view name) const {
   return {};
 }
 
+/// The client does not read what it asked for: others need not wait for that.
+class Connection::Standing {
+ public:
+  explicit Standing(Connection& connection) : of_(connection) { of_.crowd_.stands(of_.socket_); }
+  ~Standing() { of_.crowd_.goes_on(of_.socket_); }
+  Standing(const Standing&) = delete;
+  Standing& operator=(const Standing&) = delete;
+
+ private:
+  Connection& of_;
+};
+
 /// What the client may never send is read: others need not wait for that.
 class Connection::Reading {
  public:
@@ -190,26 +196,25 @@ class Connection::Reading {
   /// Bytes, 0 at the end, negative when the connection is lost.
   int read(std::array<char, kPiece>& piece) {
     const int count = mg_read(of_.raw_, piece.data(), piece.size());
-    if (count > 0 && (since_ += count) >= Crowd::kProgress) {
-      since_ = 0;
-      of_.crowd_.moves(of_.socket_);
-    }
+    if (count > 0) of_.note_moved(static_cast<std::size_t>(count));
     return count;
   }
 
  private:
   Connection& of_;
-  int since_ = 0;  ///< bytes
 };
+
+void Connection::note_moved(std::size_t bytes) {
+  if ((moved_ += bytes) < Crowd::kProgress) return;
+  moved_ = 0;
+  crowd_.moves(socket_);
+}
 
 Connection::Body Connection::read_body(std::size_t limit, std::string* body) {
   body->clear();
   if (info_->content_length > static_cast<long long>(limit)) return Body::too_long;
   reaper_.arm(socket_, kTransferTime);
-  if (waits_for_leave()) {
-    constexpr std::string_view kGoOn = "HTTP/1.1 100 Continue\r\n\r\n";
-    mg_write(raw_, kGoOn.data(), kGoOn.size());
-  }
+  if (waits_for_leave() && !write("HTTP/1.1 100 Continue\r\n\r\n")) return Body::broken;
   std::array<char, kPiece> piece;
   for (Reading reading(*this);;) {
     const int count = reading.read(piece);
@@ -251,7 +256,11 @@ void Connection::respond(int status, std::string_view content_type, std::string_
   head.add(headers);
   head.add("Content-Length", std::to_string(body.size()));
   head.keep_connection(!unread && stays());
-  head.send(method() == "HEAD" ? std::string_view() : body);
+  constexpr std::size_t kTogether = 1 << 16;  // bytes
+  if (method() == "HEAD") body = {};
+  const bool together = body.size() <= kTogether;
+  std::string& begin = together ? head.end().append(body) : head.end();
+  if (!send_all(begin) || (!together && !send_all(body))) return;
   if (unread && !waits_for_leave()) drop_rest();
 }
 
@@ -271,10 +280,11 @@ bool Connection::start_stream(std::string_view content_type, const Headers& head
   head.add(headers);
   if (is_of_version_1_1()) head.add("Transfer-Encoding", "chunked");
   head.add("Cache-Control", "no-store");
+  head.add("X-Accel-Buffering", "no");  // nginx would keep pieces until they are many
   head.keep_connection(is_of_version_1_1() && stays());
-  head.send();
+  const bool sent = send_all(head.end());
   reaper_.disarm(socket_);
-  return !gone();
+  return sent && !gone();
 }
 
 bool Connection::send_piece(std::string_view bytes) {
@@ -291,9 +301,33 @@ void Connection::end_stream(std::string_view last_piece) {
     send_all(last_piece);  // the end of the connection is that of the body
 }
 
+// Where a part of an answer is missing, the next one would be taken for it.
 bool Connection::send_all(std::string_view bytes) {
   reaper_.arm(socket_, kTransferTime);
-  return mg_write(raw_, bytes.data(), bytes.size()) == static_cast<int>(bytes.size());
+  if (write(bytes)) return true;
+  mg_disable_connection_keep_alive(raw_);
+  ::shutdown(socket_, SHUT_RDWR);
+  return false;
+}
+
+// civetweb would look whether the client reads only now and then, and give up too early.
+bool Connection::write(std::string_view bytes) {
+  if (socket_ < 0)
+    return mg_write(raw_, bytes.data(), bytes.size()) == static_cast<int>(bytes.size());
+  std::optional<Standing> standing;
+  while (!bytes.empty()) {
+    const ssize_t count = ::send(socket_, bytes.data(), bytes.size(), MSG_NOSIGNAL | MSG_DONTWAIT);
+    if (count >= 0) {
+      bytes.remove_prefix(static_cast<std::size_t>(count));
+      if (standing) note_moved(static_cast<std::size_t>(count));
+      continue;
+    }
+    if (errno != EAGAIN && errno != EINTR) return false;
+    if (!standing) standing.emplace(*this);
+    pollfd state{socket_, POLLOUT, 0};
+    if (::poll(&state, 1, kTransferTime.count()) == 0) return false;
+  }
+  return true;
 }
 
 bool Connection::gone() const {

@@ -77,16 +77,26 @@ void Crowd::ended(int socket) {
   in_request_.erase(in_request_.find(socket));
 }
 
+void Crowd::stands(int socket) {
+  const Guard lock(mutex_);
+  standing_.insert(socket);
+  moved_.erase(socket);
+}
+
+void Crowd::goes_on(int socket) {
+  const Guard lock(mutex_);
+  standing_.erase(socket);
+}
+
 void Crowd::moves(int socket) {
   const Guard lock(mutex_);
   moved_[socket] = Clock::now();
 }
 
 bool Crowd::is_ours(int socket) const {
-  const Endpoint local = local_of(socket);
-  if (local.port != local_.port || peer_of(socket).port < 0) return false;
+  if (peer_of(socket).port < 0) return false;
   const bool any = local_.address == "0.0.0.0" || local_.address == "::";
-  return any || local.address == local_.address;
+  return any || local_of(socket).address == local_.address;
 }
 
 void Crowd::thin_out() {
@@ -98,11 +108,12 @@ void Crowd::thin_out() {
   std::size_t connections = 0;
   std::vector<Idle> found;
   const Clock::time_point now = Clock::now();
-  find_descriptor([&](int fd) TS_REQUIRES(mutex_) {
+  find_socket(local_.port, [&](int fd) TS_REQUIRES(mutex_) {
     if (!is_ours(fd)) return false;
     ++connections;
     const std::uint64_t cookie = cookie_of(fd);
-    if (cookie == 0 || in_request_.count(fd) != 0 || has_bytes(fd)) return false;
+    const bool asks = in_request_.count(fd) != 0 || has_bytes(fd);
+    if (cookie == 0 || (asks && standing_.count(fd) == 0)) return false;
     const auto moved = moved_.find(fd);
     if (moved != moved_.end() && now - moved->second < kPatience) return false;
     const auto before = idle_.find(cookie);

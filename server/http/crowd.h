@@ -13,10 +13,10 @@
 
 namespace mbcosim::server::http {
 
-/// A connection holds a worker while its client sends the head of a request, its body, or nothing.
-/// When such and others hold all workers, those without a whole request are shut down, the longest
-/// idle first, as many as wait for a worker: slow senders delay others by tenths of a second, not
-/// by their own timeouts.
+/// A connection holds a worker while its client sends the head of a request, its body, or nothing,
+/// and while it does not read its answer. When such and others hold all workers, those without a
+/// whole request and those that stand still are shut down, the longest idle first, as many as wait
+/// for a worker: they delay others by tenths of a second, not by their own timeouts.
 class Crowd {
  public:
   using Clock = std::chrono::steady_clock;
@@ -35,8 +35,12 @@ class Crowd {
   /// that could not be found.
   void began(int socket);
   void ended(int socket);
-  /// Of a body another `kProgress` bytes have come: who does so often is not idle.
-  static constexpr int kProgress = 32 << 10;
+  /// The client does not read its answer, whatever it sends meanwhile; it does again.
+  void stands(int socket);
+  void goes_on(int socket);
+  /// Of a body, or of an answer, another `kProgress` bytes have come: who does so often is not
+  /// idle.
+  static constexpr std::size_t kProgress = 32 << 10;
   void moves(int socket);
 
  private:
@@ -50,7 +54,8 @@ class Crowd {
   Endpoint local_ TS_GUARDED_BY(mutex_);
   std::size_t held_ TS_GUARDED_BY(mutex_) = 0;
   std::multiset<int> in_request_ TS_GUARDED_BY(mutex_);
-  /// By cookie: since when a socket is seen with nothing to read and no request.
+  std::set<int> standing_ TS_GUARDED_BY(mutex_);  ///< sockets
+  /// By cookie: since when a socket is seen with nothing to read and no request, or stands.
   std::map<std::uint64_t, Clock::time_point> idle_ TS_GUARDED_BY(mutex_);
   std::map<int, Clock::time_point> moved_ TS_GUARDED_BY(mutex_);  ///< of sockets
   bool stop_ TS_GUARDED_BY(mutex_) = false;

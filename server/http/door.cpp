@@ -7,7 +7,7 @@
 #include <latch>
 #include <stdexcept>
 
-#include "host/loopback.h"
+#include "host/addresses.h"
 #include "http/admission.h"
 #include "http/connection.h"
 #include "http/crowd.h"
@@ -84,12 +84,13 @@ Door::Impl::Impl(const DoorOptions& options, DoorParts given)
   check_origins(options.origins);
   mg_init_library(MG_FEATURES_DEFAULT);
   const std::string threads = std::to_string(options.connections);
+  const std::string transfer_time = std::to_string(kTransferTime.count());
   const std::array<const char*, 19> settings{"listening_ports",
                                              wanted.c_str(),
                                              "num_threads",
                                              threads.c_str(),
                                              "request_timeout_ms",
-                                             "5000",
+                                             transfer_time.c_str(),
                                              "keep_alive_timeout_ms",
                                              "2000",
                                              "enable_keep_alive",

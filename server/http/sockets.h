@@ -18,8 +18,8 @@ Endpoint peer_of(int socket);
 /// Of an IP socket.
 Endpoint local_of(int socket);
 
-/// Calls `look` with each open descriptor until it gives true; that descriptor, or -1 when it never
-/// did or when the descriptors cannot be listed.
-int find_descriptor(const std::function<bool(int)>& look);
+/// Calls `look` with each open IP socket at a port of this machine until it gives true; that
+/// socket, or -1 when it never did.
+int find_socket(int port, const std::function<bool(int)>& look);
 
 }  // namespace mbcosim::server::http

@@ -5,7 +5,7 @@
 #include <cstdio>
 
 #include "daemon/listener.h"
-#include "host/loopback.h"
+#include "host/addresses.h"
 #include "options/address_checks.h"
 #include "options/number_checks.h"
 #include "replay/model_replay.h"

@@ -1,8 +1,11 @@
 #include "rpc/health.h"
 
+#include <arpa/inet.h>
+
 #include <optional>
 
 #include "grpc/health/v1/health.pb.h"
+#include "host/addresses.h"
 #include "rpc/methods.h"
 
 namespace mbcosim::server {
@@ -11,8 +14,19 @@ namespace {
 using grpc::health::v1::HealthCheckRequest;
 using grpc::health::v1::HealthCheckResponse;
 
-/// "ipv4:127.0.0.1" of "ipv4:127.0.0.1:40000", "unix" of sockets in files.
-std::string host_of(const std::string& peer) { return peer.substr(0, peer.rfind(':')); }
+/// "ipv4:127.0.0.1" of "ipv4:127.0.0.1:40000", the network of addresses of version 6, "unix" of
+/// sockets in files.
+std::string host_of(const std::string& peer) {
+  constexpr std::string_view kOpen = "%5B";
+  const std::string host = peer.substr(0, peer.rfind(':'));
+  const std::size_t open = host.find(kOpen), first = open + kOpen.size();
+  if (open == std::string::npos) return host;
+  in6_addr address{};
+  const std::string number = host.substr(first, host.find('%', first) - first);
+  if (::inet_pton(AF_INET6, number.c_str(), &address) != 1) return host;
+  keep_network(address);
+  return {reinterpret_cast<const char*>(&address), sizeof address};
+}
 
 }  // namespace
 

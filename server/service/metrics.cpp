@@ -83,7 +83,8 @@ Metrics::Metrics()
                        "Samples that subscribers did not read in time")),
       dropped_connections_(counter(
           *registry_, "mbcosim_connections_dropped_total",
-          "Connections for which, or for their source, too few file descriptors were free")),
+          "Connections for which, or for their source, too few file descriptors were free, or "
+          "too much memory would have been taken by its handshakes")),
       broken_off_connections_(
           counter(*registry_, "mbcosim_connections_broken_off_total",
                   "Connections whose calls came faster than they could be answered")),
@@ -130,7 +131,11 @@ void Metrics::watch(const std::string& name, const std::string& help, const std:
 }
 
 void Metrics::expose(const std::string& address) {
-  exposer_ = std::make_unique<prometheus::Exposer>(address);
+  // Who connects and asks for nothing has a thread as long as that takes.
+  const std::vector<std::string> settings{
+      "listening_ports",    address, "num_threads",           "16",
+      "request_timeout_ms", "2000",  "keep_alive_timeout_ms", "500"};
+  exposer_ = std::make_unique<prometheus::Exposer>(settings);
   exposer_->RegisterCollectable(registry_);
   exposer_->RegisterCollectable(watched_);
 }

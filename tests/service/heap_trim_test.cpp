@@ -60,14 +60,37 @@ TEST_F(HeapTrimTest, ComesThreeTimesWhenItIsAsked) {
 }
 
 #ifndef MBCOSIM_SANITIZED  // there `new` is the sanitizer's
-TEST_F(HeapTrimTest, WhatWasFreedBetweenOthersGoesBackToTheSystem) {
-  constexpr std::size_t kSize = 64 << 10, kCount = 2000;  // 128 MB, no piece is mapped by itself
-  std::vector<std::unique_ptr<char[]>> pieces;
-  for (std::size_t k = 0; k < kCount; ++k) {
+using Pieces = std::vector<std::unique_ptr<char[]>>;
+
+/// None is mapped by itself.
+Pieces resident_pieces(std::int64_t bytes) {
+  constexpr std::size_t kSize = 64 << 10;
+  Pieces pieces;
+  for (std::int64_t k = 0; k < bytes / static_cast<std::int64_t>(kSize); ++k) {
     pieces.push_back(std::make_unique<char[]>(kSize));
     std::memset(pieces.back().get(), 1, kSize);
   }
-  const std::unique_ptr<char[]> last = std::make_unique<char[]>(kSize);
+  return pieces;
+}
+
+TEST_F(HeapTrimTest, WhatNoBudgetCountsGoesBackWheneverItWasFreed) {
+  EXPECT_FALSE(at(0));
+  Pieces pieces = resident_pieces(200 * kMb);
+  const Pieces last = resident_pieces(kMb);
+  EXPECT_FALSE(at(20000));
+  EXPECT_TRUE(at(22000));  // in vain
+  const std::int64_t before = resident_bytes();
+  pieces.clear();
+  EXPECT_FALSE(at(40500));
+  EXPECT_TRUE(at(42100));
+  EXPECT_LT(resident_bytes(), before - 150 * kMb);
+  EXPECT_FALSE(at(61000));
+  EXPECT_FALSE(at(63000));
+}
+
+TEST_F(HeapTrimTest, WhatWasFreedBetweenOthersGoesBackToTheSystem) {
+  Pieces pieces = resident_pieces(128 * kMb);
+  const Pieces last = resident_pieces(kMb);
   const std::int64_t before = resident_bytes();
   pieces.clear();
   const std::int64_t kept = resident_bytes();

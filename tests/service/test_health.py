@@ -1,10 +1,12 @@
 """Listeners, health, reflection, credentials, configuration."""
+import contextlib
 import os
 import re
 import socket
 import stat
 import subprocess
 import time
+import urllib.request
 
 import grpc
 import pytest
@@ -307,6 +309,18 @@ def test_a_variable_that_is_no_option_is_an_error_at_the_start():
     pod = dict(os.environ, **given, KUBERNETES_SERVICE_HOST="10.0.0.1")
     assert subprocess.run([DAEMON, "--print-config"], stdout=subprocess.DEVNULL, env=pod).returncode == 0
     assert "MBCOSIMD_WORKER is no option" in refused(**given, KUBERNETES_SERVICE_HOST="10.0.0.1", MBCOSIMD_WORKER="1")
+
+
+def test_who_asks_metrics_for_nothing_holds_up_nobody(start_daemon):
+    with contextlib.closing(socket.socket()) as free:
+        free.bind(("127.0.0.1", 0))
+        address = free.getsockname()
+    start_daemon("--metrics", f"{address[0]}:{address[1]}")
+    with contextlib.ExitStack() as stack:
+        for _ in range(8):
+            stack.enter_context(socket.create_connection(address, 20 * TIME_FACTOR))
+        with urllib.request.urlopen(f"http://{address[0]}:{address[1]}/metrics", timeout=15) as answer:
+            assert b"mbcosim_steps_total" in answer.read()
 
 
 def certificate(folder, name, subject, signer=None, extra=()):

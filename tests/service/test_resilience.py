@@ -23,6 +23,7 @@ from http2 import HalfMessages, flood
 from mbcosim import bundle
 from mbcosim.v1 import (coupling_pb2_grpc, reduction_pb2, reduction_pb2_grpc, simulations_pb2 as pb, simulations_pb2_grpc, telemetry_pb2,
                         telemetry_pb2_grpc)
+from test_health import certificate
 from test_operation import metrics
 
 TOKENS = ("ann-token-0123456789 control ann\nbob-token-0123456789 control bob\n"
@@ -423,6 +424,21 @@ def test_a_few_processes_cannot_take_all_file_descriptors(start_daemon, start_cr
             assert is_found_healthy(daemon)
             with daemon.connect() as other:
                 assert len(other.list()) == 1
+
+
+def test_handshakes_of_one_source_take_a_part_of_the_memory(start_daemon, tmp_path):
+    """Each takes some 64 KB before it has shown who it is."""
+    certificate(tmp_path, "server", "/CN=localhost")
+    pem, key = (str(tmp_path / f"server.{ending}") for ending in ("pem", "key"))
+    daemon = start_daemon("--http", "127.0.0.1:0", "--listen", "127.0.0.1:0", "--tls-certificate", pem, "--tls-key", key, "--tls-client-ca", pem,
+                          "--limit-memory", str(100 << 20))
+    wait_for(lambda: "listening on 127.0.0.1:" in daemon.log())
+    host, port = re.search(r"listening on (127\.0\.0\.1):(\d+)", daemon.log()).groups()
+    with contextlib.ExitStack() as stack:
+        for _ in range(250):
+            stack.enter_context(contextlib.closing(socket.create_connection((host, int(port)), 30 * TIME_FACTOR)))
+        wait_for(lambda: metrics(daemon)["mbcosim_connections_dropped_total"] == 250 - (100 << 20) // 8 // (80 << 10))
+        assert is_found_healthy(daemon)
 
 
 def test_a_daemon_without_file_descriptors_goes_on_serving_who_is_connected(start_daemon, start_crowd):

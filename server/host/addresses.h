@@ -1,10 +1,15 @@
 #pragma once
 
+#include <netinet/in.h>
+
 #include <string>
 
 namespace mbcosim::server {
 
 /// Is HOST:PORT reached from this machine only? Names other than localhost are not looked up.
 bool is_loopback(const std::string& address);
+
+/// Leaves of an address of version 6 the network, whose addresses may all be one host's.
+void keep_network(in6_addr& address);
 
 }  // namespace mbcosim::server

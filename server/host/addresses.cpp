@@ -1,6 +1,9 @@
-#include "host/loopback.h"
+#include "host/addresses.h"
 
 #include <arpa/inet.h>
+
+#include <algorithm>
+#include <iterator>
 
 namespace mbcosim::server {
 
@@ -10,6 +13,12 @@ bool is_loopback(const std::string& address) {
   const bool in_loopback_net =
       ::inet_pton(AF_INET, host.c_str(), &number) == 1 && (ntohl(number.s_addr) >> 24) == 127;
   return host == "localhost" || host == "[::1]" || in_loopback_net;
+}
+
+void keep_network(in6_addr& address) {
+  constexpr std::size_t kNetwork = 8;  // bytes
+  if (!IN6_IS_ADDR_V4MAPPED(&address))
+    std::fill(address.s6_addr + kNetwork, std::end(address.s6_addr), std::uint8_t{0});
 }
 
 }  // namespace mbcosim::server
