@@ -93,8 +93,15 @@ void Crowd::moves(int socket) {
   moved_[socket] = Clock::now();
 }
 
+void Crowd::dismiss() {
+  const Guard lock(mutex_);
+  find_socket(local_.port, [&](int fd) TS_REQUIRES(mutex_) {
+    if (is_ours(fd) && in_request_.count(fd) == 0) shut_down(fd, cookie_of(fd));
+    return false;
+  });
+}
+
 bool Crowd::is_ours(int socket) const {
-  if (peer_of(socket).port < 0) return false;
   const bool any = local_.address == "0.0.0.0" || local_.address == "::";
   return any || local_of(socket).address == local_.address;
 }
@@ -109,7 +116,7 @@ void Crowd::thin_out() {
   std::vector<Idle> found;
   const Clock::time_point now = Clock::now();
   find_socket(local_.port, [&](int fd) TS_REQUIRES(mutex_) {
-    if (!is_ours(fd)) return false;
+    if (peer_of(fd).port < 0 || !is_ours(fd)) return false;
     ++connections;
     const std::uint64_t cookie = cookie_of(fd);
     const bool asks = in_request_.count(fd) != 0 || has_bytes(fd);

@@ -42,11 +42,14 @@ class Crowd {
   /// idle.
   static constexpr std::size_t kProgress = 32 << 10;
   void moves(int socket);
+  /// The door closes: nobody is let in, and who asks for nothing is shut down. The library's
+  /// threads would look for that once in two seconds.
+  void dismiss();
 
  private:
   void loop();
   void thin_out() TS_REQUIRES(mutex_);
-  bool is_ours(int socket) const TS_REQUIRES(mutex_);
+  bool is_ours(int socket) const TS_REQUIRES(mutex_);  ///< or the door's own
 
   const std::size_t workers_;
   Mutex mutex_;

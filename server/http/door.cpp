@@ -132,6 +132,7 @@ Door::Impl::Impl(const DoorOptions& options, DoorParts given)
 Door::Impl::~Impl() {
   rpc.close();
   reaper.hurry(kLastWords);
+  crowd.dismiss();
   if (context) mg_stop(context);
   mg_exit_library();
 }

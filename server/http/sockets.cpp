@@ -64,7 +64,7 @@ Endpoint local_of(int socket) {
 }
 
 int find_socket(int port, const std::function<bool(int)>& look) {
-  const int end = end_of_descriptors();
+  const int end = port < 0 ? 0 : end_of_descriptors();
   for (int fd = 0; fd < end; ++fd) {
     sockaddr_storage name{};
     socklen_t size = sizeof name;

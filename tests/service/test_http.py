@@ -457,7 +457,7 @@ def test_a_reader_that_stands_still_does_not_hold_up_the_end(start_daemon, pendu
 def test_streams_of_an_identity_are_capped_and_a_closed_one_makes_room(door, server, pendulum):
     with server.load(pendulum) as simulation:
         links = [open_stream(door, simulation.name) for _ in range(3)]
-        assert all(b" 200 " in answer for _, answer in links)
+        assert all(b" 200 " in answer and b"\r\nX-Accel-Buffering: no\r\n" in answer for _, answer in links)
         end = json.loads(door.stream("Telemetry/Subscribe", {"simulation": simulation.name})[-1][1])
         assert end["error"]["code"] == "resource_exhausted"
         links[0][0].close()
