@@ -449,6 +449,9 @@ describe('several readers', () => {
         await atStep(tab, k + 1);
       }
       const last = tabs[4];
+      await button(page, 'Save state').click();
+      await last.locator('summary', { hasText: 'Events' }).click();
+      await last.getByRole('log', { name: 'Events' }).getByText('saved the state at step 5').waitFor();
       await button(last, 'Run (space)').click();
       await samplesReach(last, (await timeOf(view)) + 0.1);
       await button(last, 'Pause (space)').click();

@@ -35,14 +35,15 @@ export async function takePlace(kind: Kind): Promise<Place | undefined> {
 
 let channel: BroadcastChannel | undefined;
 
-/** Waits for a place for a stream, as long as it is `wanted`. When the tab is hidden and one that is seen wants it, `leave` is called. */
-export async function placeToFollow(kind: Kind, wanted: () => boolean, leave: () => void): Promise<Place | undefined> {
+/** Waits for a place for a stream, as long as it is `wanted`; does something else `meanwhile`. When the tab is hidden and one that is seen wants the place, `leave` is called. */
+export async function placeToFollow(kind: Kind, wanted: () => boolean, leave: () => void, meanwhile = async () => {}): Promise<Place | undefined> {
   const others = (channel ??= new BroadcastChannel('mbcosim places'));
   if (document.hidden) await pause(HIDDEN_MILLISECONDS);
   for (; wanted(); await pause(AGAIN_MILLISECONDS)) {
     const place = await takePlace(kind);
     if (!place) {
       if (!document.hidden) others.postMessage(kind);
+      await meanwhile();
       continue;
     }
     if (!wanted()) return place.release(), undefined;

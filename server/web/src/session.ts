@@ -48,6 +48,8 @@ export interface LogEntry {
 /** Samples a second of wall time are at most so many, and at most so many bytes. */
 const RATE = 120, BYTES = 8e6;
 const RETRY_MILLISECONDS = 1500;
+/** For events that are there already. */
+const LOOK_MILLISECONDS = 500;
 /** The server has so long to end the step that is under way when a run is left. */
 const LEAVING_MILLISECONDS = 10_000;
 
@@ -75,6 +77,8 @@ export class Session implements Shown {
   private readonly ended = new AbortController();
   private stream = new AbortController();
   private eventStream = new AbortController();
+  /** The last event. */
+  private readonly seen = { journal: '', afterSequence: 0n };
   /** Whether samples come by a stream. Otherwise they are read now and then. */
   private following = false;
   private fast = new AbortController();
@@ -198,19 +202,17 @@ export class Session implements Shown {
 
   /** Follows what happens to the simulation, whoever makes it happen; begins with what the server knows of before. */
   private async watch(): Promise<void> {
-    let journal = '', afterSequence = 0n;
+    const wanted = () => !this.ended.signal.aborted;
+    const lookNowAndThen = async () => {
+      await this.readEvents(AbortSignal.timeout(LOOK_MILLISECONDS)).catch(() => {});
+      await pause(RETRY_MILLISECONDS);
+    };
     for (;;) {
-      const place = await placeToFollow('events', () => !this.ended.signal.aborted, () => this.eventStream.abort());
+      const place = await placeToFollow('events', wanted, () => this.eventStream.abort(), lookNowAndThen);
       if (!place) return;
       this.eventStream = new AbortController();
       try {
-        for await (const event of events.watchEvents({ simulation: this.name, journal, afterSequence }, { signal: this.eventStream.signal })) {
-          if (event.content.case === 'started') journal = event.content.value.journal;
-          else if (event.content.case === 'snapshot') void this.refreshSnapshots();
-          const told = event.content.case === 'missed' && afterSequence === 0n ? undefined : tell(event);
-          if (told) this.note(told.text, told.level, event.time && timestampDate(event.time));
-          afterSequence = event.sequence ?? afterSequence;
-        }
+        await this.readEvents(this.eventStream.signal);
         return;  // the simulation is deleted
       } catch {
         if (this.ended.signal.aborted) return;
@@ -218,6 +220,17 @@ export class Session implements Shown {
       } finally {
         place.release();
       }
+    }
+  }
+
+  private async readEvents(signal: AbortSignal): Promise<void> {
+    const { journal, afterSequence } = this.seen;
+    for await (const event of events.watchEvents({ simulation: this.name, journal, afterSequence }, { signal })) {
+      if (event.content.case === 'started') this.seen.journal = event.content.value.journal;
+      else if (event.content.case === 'snapshot') void this.refreshSnapshots();
+      const told = event.content.case === 'missed' && this.seen.afterSequence === 0n ? undefined : tell(event);
+      if (told) this.note(told.text, told.level, event.time && timestampDate(event.time));
+      this.seen.afterSequence = event.sequence ?? this.seen.afterSequence;
     }
   }
 

@@ -1,18 +1,39 @@
 /** What happened, newest last. */
 import type { Desk } from '../desk';
 import { h } from '../dom';
+import type { LogEntry } from '../session';
 import { section } from './section';
 
 export function logPanel(desk: Desk): HTMLElement {
   const list = h('div', { class: 'log', role: 'log', 'aria-live': 'polite', tabindex: 0, 'aria-label': 'Events' });
   const panel = section('Events', false, list);
-  let unwatch = () => {};
+  const rows = new Map<LogEntry, HTMLElement>();
+  let unwatch = () => {}, stale = false;
+
+  /** What stays is not touched: it may be selected, and is read aloud once. */
+  const draw = () => {
+    stale = false;
+    const entries = new Set(desk.session?.log.value);
+    for (const [entry, row] of rows) {
+      if (entries.has(entry)) continue;
+      row.remove();
+      rows.delete(entry);
+    }
+    for (const entry of entries) {
+      if (rows.has(entry)) continue;
+      const row = h('div', { class: entry.level }, h('span', { class: 'soft' }, entry.wall.toLocaleTimeString()), ' ', entry.text);
+      rows.set(entry, row);
+      list.append(row);
+    }
+    list.scrollTop = list.scrollHeight;
+  };
+
   desk.shown.watch(() => {
     unwatch();
     panel.classList.toggle('hidden', !desk.session);
-    unwatch = desk.session?.log.watch((entries) => {
-      list.replaceChildren(...entries.map((entry) => h('div', { class: entry.level }, h('span', { class: 'soft' }, entry.wall.toLocaleTimeString()), ' ', entry.text)));
-      list.scrollTop = list.scrollHeight;
+    unwatch = desk.session?.log.watch(() => {
+      if (!stale) requestAnimationFrame(draw);  // many may come at once
+      stale = true;
     }) ?? (() => {});
   });
   return panel;
