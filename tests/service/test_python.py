@@ -619,7 +619,7 @@ def test_the_ends_of_asynchronous_blocks_hide_nothing(daemon):
 
 def test_what_if_tries_inputs_and_stays_where_it_is(swing, server):
     before = len(server.list())
-    found = swing.what_if({"free": {}, "pushed": {"structural.2.load": [0, 0, 3, 0, 0, 0]}}, ["node.structural.2.X"], until=0.5)
+    found = swing.what_if({"free": {}, "pushed": {"structural.2.load": [0, 0, 3, 0, 0, 0]}}, names(POSITION), until=0.5)
     free, pushed = (found[name]["node.structural.2.X"][-1, 2] for name in ("free", "pushed"))
     assert free < pushed - 0.1 and swing.time == 0 and len(server.list()) == before
 
