@@ -106,6 +106,14 @@ def test_a_private_daemon_that_cannot_start_says_why():
         mbcosim.local("--no-such-option")
 
 
+def test_options_of_another_daemon_are_not_those_of_a_private_one(monkeypatch, tmp_path):
+    (tmp_path / "tokens").write_text("a-token control ann\n")
+    monkeypatch.setenv("MBCOSIMD_TOKENS", str(tmp_path / "tokens"))
+    monkeypatch.setenv("MBCOSIMD_NO_SUCH_OPTION", "1")
+    with mbcosim.local() as server:
+        assert server.list() == []
+
+
 def test_a_missing_program_is_named_with_its_remedy(monkeypatch, tmp_path):
     monkeypatch.setenv("PATH", str(tmp_path))
     monkeypatch.setenv("MBCOSIM_BIN", str(tmp_path))

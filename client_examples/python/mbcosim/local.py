@@ -26,7 +26,7 @@ def local(*options: str, program: Optional[Path] = None, timeout: float = 30.0) 
         with mbcosim.local() as server, server.load("pendulum.mbd") as pendulum:
             pendulum.run_until(1.0)
 
-    options  of the daemon: "--workers", "2"
+    options  of the daemon: "--workers", "2"; variables MBCOSIMD_… of the environment are of others
     program  path of `mbcosimd`; default: of $MBCOSIM_BIN, of the build, or on the PATH
     timeout  seconds until it must answer
     """
@@ -44,9 +44,10 @@ class _Daemon:
             self.folder = pathlib.Path(tempfile.mkdtemp(prefix="mbcosim-", dir="/tmp"))
         self.address = f"unix:{self.folder}/s"
         command = [program, "--listen", self.address, "--log-level", "warn", "--shutdown-grace", "1", *options]
+        environment = {name: value for name, value in os.environ.items() if not name.startswith("MBCOSIMD_")}  # those are of another daemon
         with open(self.folder / "log", "wb") as log:
             self.process = subprocess.Popen(["/bin/sh", "-c", _KEEPER, "sh", *command], stdin=subprocess.PIPE, stdout=subprocess.DEVNULL,
-                                            stderr=log, start_new_session=True)
+                                            stderr=log, env=environment, start_new_session=True)
 
     def log(self) -> str:
         """The end of what it wrote."""
