@@ -4,6 +4,7 @@ import contextlib
 import functools
 import os
 import signal
+import socket
 import subprocess
 import sys
 import tempfile
@@ -102,8 +103,12 @@ def test_a_private_daemon_that_is_stopped_delays_nobody_for_long():
 
 
 def test_a_private_daemon_that_cannot_start_says_why():
-    with pytest.raises(mbcosim.Unavailable, match="ended with .* before it listened: (.|\n)*--no-such-option"):
+    with pytest.raises(mbcosim.Unavailable, match="ended with .* before it served: (.|\n)*--no-such-option"):
         mbcosim.local("--no-such-option")
+    with socket.create_server(("127.0.0.1", 0)) as taken:  # which is known after the daemon listens
+        port = taken.getsockname()[1]
+        with pytest.raises(mbcosim.Unavailable, match=f"ended with .* before it served: (.|\n)*127.0.0.1:{port}"):
+            mbcosim.local("--http", f"127.0.0.1:{port}")
 
 
 def test_options_of_another_daemon_are_not_those_of_a_private_one(monkeypatch, tmp_path):

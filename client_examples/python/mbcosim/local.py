@@ -53,6 +53,12 @@ class _Daemon:
         """The end of what it wrote."""
         return (self.folder / "log").read_text(errors="replace").strip()[-2000:]
 
+    def check(self) -> None:
+        """Unavailable with what it wrote where it has ended."""
+        code = self.process.poll()
+        if code is not None:
+            raise Unavailable(f"the daemon ended with {code} before it served: {self.log()}")
+
     def stop(self) -> None:
         """Ends it and removes its folder, unless this is a process that was forked from the one that started it."""
         if os.getpid() != self._starter:
@@ -78,16 +84,14 @@ class LocalServer(Server):
         try:
             self._await_socket(time.monotonic() + timeout)
             super().__init__(self._daemon.address)
-            await_answer(self, timeout)
+            await_answer(self, timeout, self._daemon.check)  # one that cannot serve HTTP, say, ends after it listened
         except Exception:
             self._stop()
             raise
 
     def _await_socket(self, end: float) -> None:
         while not os.path.exists(self._daemon.address[len("unix:"):]):
-            code = self._daemon.process.poll()
-            if code is not None:
-                raise Unavailable(f"the daemon ended with {code} before it listened: {self._daemon.log()}")
+            self._daemon.check()
             if time.monotonic() > end:
                 raise Unavailable(f"the daemon did not listen in time: {self._daemon.log()}")
             time.sleep(0.005)
