@@ -60,14 +60,20 @@ def test_a_private_daemon_lives_as_long_as_its_connection(pendulum):
     assert not running(process) and not os.path.exists(folder)
 
 
-@pytest.mark.parametrize("how", [signal.SIGKILL, signal.SIGTERM, signal.SIGINT])
-def test_a_private_daemon_ends_with_a_program_that_is_killed(how):
-    program = "import mbcosim, time; s = mbcosim.local(); print(s.process_id, flush=True); time.sleep(600)"
-    with subprocess.Popen([sys.executable, "-c", program], stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True) as child:
-        keeper = int(child.stdout.readline())
-        assert running(keeper)
-        child.send_signal(how)
-    wait_for(lambda: not running(keeper))
+BREAKS_OFF = "import mbcosim, os, sys; s = mbcosim.local(); print(s.process_id, s.address, flush=True); sys.stdin.read(); os._exit(1)"
+
+
+@pytest.mark.parametrize("how", [signal.SIGKILL, signal.SIGTERM, signal.SIGINT, "exit"])
+def test_a_private_daemon_ends_with_a_program_that_is_killed_and_leaves_nothing(how):
+    with subprocess.Popen([sys.executable, "-c", BREAKS_OFF], stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True) as child:
+        number, _, path = child.stdout.readline().partition(" unix:")
+        keeper, folder = int(number), os.path.dirname(path)
+        assert running(keeper) and os.path.exists(folder)
+        if how == "exit":
+            child.stdin.close()
+        else:
+            child.send_signal(how)
+    wait_for(lambda: not running(keeper) and not os.path.exists(folder))
 
 
 FORKS = """

@@ -17,7 +17,18 @@ from .errors import Unavailable
 from .rpc import PARTING
 
 # The shell ends the daemon when this process writes a line, closes the pipe or dies, however it dies; its own end is that of the daemon.
-_KEEPER = 'exec 3<&0; "$@" </dev/null 3<&- & child=$!; (read -r _ <&3; kill "$child") 2>/dev/null & wait "$child"'
+# Where nobody wrote a line nobody is left to remove the folder, $0.
+_KEEPER = r'''
+exec 3<&0
+"$@" </dev/null 3<&- &
+child=$! left=
+trap left=1 HUP
+(read -r _ <&3 || kill -HUP "$$"; kill "$child") 2>/dev/null &
+wait "$child"
+code=$?
+[ -z "$left" ] || { wait "$child"; rm -rf "$0"; }
+exit "$code"
+'''
 
 
 def local(*options: str, program: Optional[Path] = None, timeout: float = 30.0) -> LocalServer:
@@ -46,7 +57,7 @@ class _Daemon:
         command = [program, "--listen", self.address, "--log-level", "warn", "--shutdown-grace", "1", *options]
         environment = {name: value for name, value in os.environ.items() if not name.startswith("MBCOSIMD_")}  # those are of another daemon
         with open(self.folder / "log", "wb") as log:
-            self.process = subprocess.Popen(["/bin/sh", "-c", _KEEPER, "sh", *command], stdin=subprocess.PIPE, stdout=subprocess.DEVNULL,
+            self.process = subprocess.Popen(["/bin/sh", "-c", _KEEPER, str(self.folder), *command], stdin=subprocess.PIPE, stdout=subprocess.DEVNULL,
                                             stderr=log, env=environment, start_new_session=True)
 
     def log(self) -> str:
