@@ -577,7 +577,8 @@ describe('what is shown of a simulation that changes', () => {
       await page.getByRole('tab', { name: 'Simulations' }).click();
       const row = page.locator('.list .name', { hasText: 'heavy_top.mbd' }), mine = page.locator('.list .card.current .name');
       await row.waitFor();
-      for (const [simulation, name] of [[view.simulation, mine], [other, row]] as const) {
+      const renamed = (simulation: string, displayName: string) => view.call('Simulations/UpdateSimulation', { simulation, displayName });
+      for (const [simulation, name, called] of [[view.simulation, mine, 'first'], [other, row, 'second, heavy_top.mbd']] as const) {
         if (name === mine) await name.focus();
         else {
           await name.hover();
@@ -585,11 +586,21 @@ describe('what is shown of a simulation that changes', () => {
         }
         const { time } = await view.call<{ time: number }>('Simulations/Step', { simulation, steps: 10 });
         await name.getByText(`ready, ${time} s`).waitFor();
+        await renamed(simulation, called);
+        await name.getByText(called).waitFor();
         expect(await focused(page)).toBe(await name.textContent());
       }
       await page.mouse.up();
       await atStep(page, 10);
       await until(page, (name) => location.hash.includes(encodeURIComponent(name)), other);
+      await until(page, (title) => document.title === title, 'second, heavy_top.mbd – mbcosim');
+      await renamed(other, 'heavy_top.mbd');
+      await until(page, (title) => document.title === title, 'heavy_top.mbd – mbcosim');
+      await page.getByRole('tab', { name: 'Simulations' }).click();
+      const question = page.waitForEvent('dialog');
+      const [asked] = await Promise.all([question, question.then((dialog) => dialog.dismiss()), button(page, 'Delete first').click()]);
+      expect(asked.message()).toBe('Delete the simulation first?');
+      expect(await button(page, 'Compare with first').count()).toBe(1);
       await view.call('Simulations/DeleteSimulation', { simulation: view.simulation });
       await mine.getByText('heavy_top.mbd').waitFor({ state: 'attached' });
       await until(page, () => document.querySelectorAll('.left .list li').length === 1, undefined);
@@ -711,10 +722,26 @@ describe('solver and events', () => {
 });
 
 describe('a deck from the disk', () => {
-  test('is loaded with the files that it includes', async () => {
-    await withPage(browser, 'pendulum.mbd', async ({ page }, view) => {
+  test('is loaded with the files that it includes, once it is chosen, though the connection is lost meanwhile', async () => {
+    await withPage(browser, 'pendulum.mbd', async ({ page, faults }, view) => {
       await page.evaluate(() => (document.querySelector('.empty') as HTMLElement).classList.remove('hidden'));
-      await page.getByLabel('Files of a deck').setInputFiles([`${MODELS}/cantilever_dead_load.mbd`, `${MODELS}/cantilever.inc`]);
+      const lists = '**/mbcosim.v1.Simulations/ListSimulations', listed = () => page.waitForResponse(lists);
+      const lose = async () => {
+        const lost = new Promise<void>((resolve) => void page.route(lists, (route) => route.abort('connectionreset').then(resolve)));
+        await lost;
+        await page.unroute(lists);
+      };
+      await lose();
+      await page.getByLabel('Files of a deck').setInputFiles(['cantilever_dead_load.mbd', 'cantilever.inc', 'pendulum.mbd'].map((name) => `${MODELS}/${name}`));
+      const question = page.getByText('Which of them is the main file?');
+      await question.waitFor();
+      await listed();
+      await lose();
+      await listed();
+      await listed();
+      expect(await question.isVisible()).toBe(true);
+      expect(faults.splice(0).join()).toContain('ERR_CONNECTION_RESET');
+      await page.getByRole('main').getByRole('button', { name: 'cantilever_dead_load.mbd' }).click();
       await until(page, (name) => location.hash.includes('simulation=') && !location.hash.includes(encodeURIComponent(name)), view.simulation);
       await shown(page);
       expect(await page.title()).toBe('cantilever_dead_load.mbd – mbcosim');
