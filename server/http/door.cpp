@@ -243,7 +243,7 @@ void Door::Impl::serve_call(Connection& connection,
   if (!authorization)
     return fail(connection, v1::REASON_UNAUTHENTICATED,
                 "a token is required: `Authorization: Bearer TOKEN`, or the page's address as the "
-                "daemon printed it");
+                "daemon printed it, with ?token=YOURS behind it where it has none");
   const Caller caller = parts.authenticator.check_local(*authorization, Role::observe);
   rpc.serve(connection, method, caller.identity, *authorization);
 }

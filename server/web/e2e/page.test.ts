@@ -819,7 +819,7 @@ describe('who comes in', () => {
   test('without the token the page says what to do', async () => {
     const view = await View.start('pendulum.mbd');
     const visited = await visit(browser, `${view.origin}/`);
-    const words = visited.page.getByText('Open the address that the daemon printed');
+    const words = visited.page.getByText('Open the address that the daemon printed when it started; where that has no token, with yours behind it: ?token=YOURS.');
     await words.waitFor();
     const said = await words.elementHandle();
     for (let i = 0; i < 2; ++i) await visited.page.waitForResponse('**/mbcosim.v1.Simulations/ListSimulations');
@@ -879,7 +879,7 @@ describe('a daemon that is started again with another token', () => {
       await daemon.kill();
       await page.getByText('The daemon does not answer; trying again.').waitFor();
       await daemon.start();
-      await page.locator('.banner').getByText('Open the address that the daemon printed when it started: it has the token.').waitFor();
+      await page.locator('.banner').getByText('Open the address that the daemon printed when it started;').waitFor();
     }, { openSocket: true });
   });
 });

@@ -44,7 +44,7 @@ function errorInfo(error: ConnectError) {
 
 /** What to do about it, where there is something. */
 export function remedy(failure: Failure): string {
-  return failure.reason === 'UNAUTHENTICATED' ? 'Open the address that the daemon printed when it started: it has the token.' : '';
+  return failure.reason === 'UNAUTHENTICATED' ? 'Open the address that the daemon printed when it started; where that has no token, with yours behind it: ?token=YOURS.' : '';
 }
 
 export function failureOf(thrown: unknown): Failure {
