@@ -225,7 +225,7 @@ void Door::Impl::serve_page(Connection& connection) {
     if (!admission->accepts(*token))
       return fail(connection, v1::REASON_UNAUTHENTICATED, "the token in the address is wrong");
     return connection.respond(303, kPlainText, "",
-                              {{"Location", "/"},
+                              {{"Location", "./"},  // a proxy may have a prefix before it
                                {"Set-Cookie", admission->cookie_name() + "=" + *token +
                                                   "; Path=/; HttpOnly; SameSite=Strict"}});
   }

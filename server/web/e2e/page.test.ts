@@ -6,7 +6,7 @@ import { createRequire } from 'node:module';
 import { tmpdir } from 'node:os';
 import { dirname, join } from 'node:path';
 import { afterAll, beforeAll, describe, expect, test } from 'vitest';
-import { ask, atStep, create, curvesDrawn, Daemon, decks, drawCalls, drawnLayers, FACTOR, follows, frameRate, freePort, hide, launch, MODELS, moveSliderUnderSample, newTab, picture, recorded, rested, samplesHave, samplesReach, scene, shown, turnTo, until, View, visit, withPage, type Visit } from './bench';
+import { ask, atStep, create, curvesDrawn, Daemon, decks, drawCalls, drawnLayers, FACTOR, follows, frameRate, freePort, hide, launch, MODELS, moveSliderUnderSample, newTab, picture, proxy, recorded, rested, samplesHave, samplesReach, scene, shown, turnTo, until, View, visit, withPage, type Visit } from './bench';
 
 let browser: Browser;
 beforeAll(async () => {
@@ -828,15 +828,22 @@ describe('who comes in', () => {
     await view.stop();
   });
 
-  test('a reload shows the simulation where it stands', async () => {
-    await withPage(browser, 'pendulum.mbd', async (visited, view) => {
-      await visited.page.getByRole('button', { name: '+10' }).click();
-      await atStep(visited.page, 10);
-      await visited.page.reload();
-      await shown(visited.page);
-      await atStep(visited.page, 10);
-      await expectSceneOf(visited, view);
-    });
+  test('a reload shows the simulation where it stands, behind a proxy with a prefix too', async () => {
+    const view = await View.start('pendulum.mbd'), between = await proxy(view.origin, '/mb');
+    const visited = await visit(browser, view.address.replace(`${view.origin}/`, `${between.origin}/mb/`));
+    await shown(visited.page);
+    await visited.page.getByRole('button', { name: '+10' }).click();
+    await atStep(visited.page, 10);
+    await visited.page.reload();
+    await shown(visited.page);
+    await atStep(visited.page, 10);
+    await follows(visited.page);
+    await expectSceneOf(visited, view);
+    expect(visited.page.url()).toContain('/mb/#simulation=');
+    expect(visited.faults).toEqual([]);
+    await visited.close();
+    between.close();
+    await view.stop();
   });
 });
 

@@ -1,4 +1,4 @@
-/** The service as the page calls it: Connect over the origin that served the page. */
+/** The service as the page calls it: Connect beside the page, which a proxy may serve under a prefix. */
 import { fromBinary } from '@bufbuild/protobuf';
 import { Code, ConnectError, createClient } from '@connectrpc/connect';
 import { createConnectTransport } from '@connectrpc/connect-web';
@@ -10,7 +10,8 @@ import { Telemetry } from './gen/mbcosim/v1/telemetry_pb';
 import { newRequestId, repeatable } from './requests';
 import { chunks, type NamedFile } from './upload';
 
-const transport = createConnectTransport({ baseUrl: globalThis.location?.origin ?? '', useBinaryFormat: true, interceptors: [repeatable] });
+const { origin = '', pathname = '' } = globalThis.location ?? {};
+const transport = createConnectTransport({ baseUrl: origin + pathname.replace(/[^/]*$/, ''), useBinaryFormat: true, interceptors: [repeatable] });
 
 export const simulations = createClient(Simulations, transport);
 export const telemetry = createClient(Telemetry, transport);
