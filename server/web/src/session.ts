@@ -180,6 +180,7 @@ export class Session implements Shown {
       this.following = true;
       const layout = this.layout;
       try {
+        if (this.ended.signal.aborted) return;  // in the moment in which it got the place
         const batches = telemetry.subscribe(
           { simulation: this.name, handles: [...layout.handles], minimumInterval: duration(shortestInterval(layout)), policy: OverflowPolicy.DROP_OLDEST, bufferSamples: 64 },
           { signal: this.stream.signal },
@@ -188,11 +189,11 @@ export class Session implements Shown {
         return;  // the simulation is deleted
       } catch (thrown) {
         if (this.ended.signal.aborted) return;
-        if (!this.stream.signal.aborted) await pause(RETRY_MILLISECONDS);
       } finally {
         this.following = false;
         place.release();
       }
+      if (!this.stream.signal.aborted) await pause(RETRY_MILLISECONDS);
     }
   }
 
@@ -204,6 +205,7 @@ export class Session implements Shown {
       if (!place) return;
       this.eventStream = new AbortController();
       try {
+        if (this.ended.signal.aborted) return;
         for await (const event of events.watchEvents({ simulation: this.name, journal, afterSequence }, { signal: this.eventStream.signal })) {
           if (event.content.case === 'started') journal = event.content.value.journal;
           else if (event.content.case === 'snapshot') void this.refreshSnapshots();
@@ -214,10 +216,10 @@ export class Session implements Shown {
         return;  // the simulation is deleted
       } catch {
         if (this.ended.signal.aborted) return;
-        if (!this.eventStream.signal.aborted) await pause(RETRY_MILLISECONDS);
       } finally {
         place.release();
       }
+      if (!this.eventStream.signal.aborted) await pause(RETRY_MILLISECONDS);
     }
   }
 
