@@ -50,8 +50,12 @@ export function connect(address, { token, credentials = grpc.credentials.createI
     geometry: stub(v1.Geometry),
     coupling: stub(v1.Coupling),
   };
-  const close = () => Object.values(stubs).forEach((client) => client.close());
-  return { ...stubs, metadata, close, reconnect };
+  let closed = false;
+  const close = () => {
+    closed = true;
+    Object.values(stubs).forEach((client) => client.close());
+  };
+  return { ...stubs, metadata, close, isClosed: () => closed, reconnect };
 }
 
 function options(timeout) {
@@ -70,6 +74,11 @@ function countdown(timeout) {
 function failure(name, details) {
   const code = grpc.status[name];
   return Object.assign(new Error(`${code} ${name}: ${details}`), { code, details, metadata: new grpc.Metadata() });
+}
+
+/** To ask a closed channel for its state would open it again. */
+function checkOpen(server) {
+  if (server.isClosed()) throw failure("UNAVAILABLE", "the connection is closed");
 }
 
 /** Protobuf would make a whole number of anything. */
@@ -95,10 +104,13 @@ function checked(message, type) {
 }
 
 /** Waits, not for ever, while a connection is made. grpc-js waits as long as a server accepts connections and says nothing. `deadline`: the call's. */
-async function reach(client, { deadline = Infinity }) {
+async function reach(server, client, { deadline = Infinity }) {
   const channel = client.getChannel(), patience = Date.now() + 1000 * CONNECTING, latest = Math.min(patience, deadline);
   const { IDLE, CONNECTING: underway } = grpc.connectivityState;
-  for (let state; [IDLE, underway].includes((state = channel.getConnectivityState(true))); ) {
+  for (;;) {
+    checkOpen(server);
+    const state = channel.getConnectivityState(true);
+    if (![IDLE, underway].includes(state)) return;
     if (Date.now() >= latest) throw failure(latest < patience ? "DEADLINE_EXCEEDED" : "UNAVAILABLE", `the server at ${channel.getTarget()} accepts connections and does not answer`);
     await new Promise((resolve) => channel.watchConnectivityState(state, latest, () => resolve()));
   }
@@ -116,7 +128,7 @@ export function about(server, simulation) {
 export async function call(server, client, method, request, timeout) {
   const choices = options(timeout);
   checked(request, client[method].requestType.type);
-  await reach(client, choices);
+  await reach(server, client, choices);
   return new Promise((resolve, reject) =>
     client[method](request, about(server, request.simulation), choices, (error, reply) => (error ? reject(error) : resolve(reply))),
   );
@@ -132,7 +144,7 @@ async function repeated(server, method, request, timeout) {
       return await call(server, server.simulations, method, request, left());
     } catch (error) {
       end ??= Date.now() + 1000 * server.reconnect;
-      if (error.code !== grpc.status.UNAVAILABLE || Date.now() >= end) throw error;
+      if (error.code !== grpc.status.UNAVAILABLE || server.isClosed() || Date.now() >= end) throw error;
       await delay(Math.min(pause, end - Date.now()));
     }
   }
@@ -148,7 +160,7 @@ export function series(server, client, method, request, timeout) {
   async function* messages() {
     const choices = options(timeout);
     checked(request, client[method].requestType.type);
-    await Promise.race([waked, reach(client, choices)]);
+    await Promise.race([waked, reach(server, client, choices)]);
     if (cancelled) return;
     stream = client[method](request, about(server, request.simulation), choices);
     stream.on("error", () => {}); // is thrown to who waits; nobody does when the series is left
@@ -253,7 +265,7 @@ export class Simulation {
   async stepper(outputs = [], timeout) {
     const choices = options(timeout);
     const handles = await this.handles(outputs, timeout);
-    await reach(this.server.simulations, choices);
+    await reach(this.server, this.server.simulations, choices);
     return new Stepper(this.server, this.name, handles, choices);
   }
 
@@ -279,6 +291,7 @@ class Stepper {
   #failure;
 
   constructor(server, simulation, outputs, choices) {
+    this.server = server;
     this.request = { simulation, outputs };
     this.stream = server.simulations.StepStream(about(server, simulation), choices);
     this.stream.on("data", (reply) => this.#waiting.shift()?.resolve(reply.step));
@@ -293,6 +306,7 @@ class Stepper {
 
   async step(steps = 1, inputs) {
     whole(steps, "steps");
+    checkOpen(this.server);
     if (this.#failure) throw this.#failure;
     return new Promise((resolve, reject) => {
       this.#waiting.push({ resolve, reject });

@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import collections
 import dataclasses
+import itertools
 import re
 from typing import Any, Iterable, Optional
 
@@ -54,7 +55,7 @@ def sweep(client: Any, address: str, sinks: Iterable[float], holes: Iterable[flo
     """A future of a Drop for each pair, in order."""
     with open(example.model("landing_gear.mbd"), encoding="utf-8") as file:
         deck = file.read()
-    pairs = [(sink, hole) for sink in sinks for hole in holes]
+    pairs = list(itertools.product(sinks, holes))
     return [client.submit(drop, address, deck, *pair, pure=False, retries=5) for pair in pairs]
 
 

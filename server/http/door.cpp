@@ -227,7 +227,7 @@ void Door::Impl::serve_page(Connection& connection) {
     if (!admission->accepts(*token))
       return fail(connection, v1::REASON_UNAUTHENTICATED, "the token in the address is wrong");
     return connection.respond(303, kPlainText, "",
-                              {{"Location", "/"},
+                              {{"Location", "./"},  // a proxy may have a prefix before it
                                {"Set-Cookie", admission->cookie_name() + "=" + *token +
                                                   "; Path=/; HttpOnly; SameSite=Strict"}});
   }
@@ -245,7 +245,7 @@ void Door::Impl::serve_call(Connection& connection,
   if (!authorization)
     return fail(connection, v1::REASON_UNAUTHENTICATED,
                 "a token is required: `Authorization: Bearer TOKEN`, or the page's address as the "
-                "daemon printed it");
+                "daemon printed it, with ?token=YOURS behind it where it has none");
   const Caller caller = parts.authenticator.check_local(*authorization, Role::observe);
   rpc.serve(connection, method, caller.identity, *authorization);
 }

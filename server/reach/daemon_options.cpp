@@ -23,6 +23,14 @@ std::string from_environment(const char* name, const std::string& otherwise) {
   return value && *value ? value : otherwise;
 }
 
+/// What is given goes before the environment, there the token itself before a file.
+std::string token_of(const DaemonOptions& options) {
+  if (!options.token_file.empty()) return token_of_file(options.token_file);
+  if (!options.token.empty()) return options.token;
+  const std::string path = from_environment("MBCOSIM_TOKEN_FILE", "");
+  return path.empty() ? "" : token_of_file(path);
+}
+
 }  // namespace
 
 void add_daemon_options(CLI::App& command, DaemonOptions& options) {
@@ -30,19 +38,25 @@ void add_daemon_options(CLI::App& command, DaemonOptions& options) {
   // other's command line.
   options.address = from_environment("MBCOSIM_ADDRESS", default_socket());
   options.token = from_environment("MBCOSIM_TOKEN", "");
+  options.ca = from_environment("MBCOSIM_TLS_CA", "");
+  options.certificate = from_environment("MBCOSIM_TLS_CERTIFICATE", "");
+  options.key = from_environment("MBCOSIM_TLS_KEY", "");
   command
       .add_option("--address", options.address,
                   "The daemon's: unix:PATH or HOST:PORT; the default is MBCOSIM_ADDRESS of the "
                   "environment, where that is set")
       ->capture_default_str();
   command.add_option("--token", options.token,
-                     "Bearer token; default: MBCOSIM_TOKEN of the environment");
+                     "Bearer token; default: MBCOSIM_TOKEN of the environment, or what the file "
+                     "MBCOSIM_TOKEN_FILE holds");
   command.add_option("--token-file", options.token_file,
                      "File with the bearer token; goes before the token itself");
   command.add_option("--ca", options.ca,
-                     "PEM file: authority of the daemon's certificate; the connection uses TLS");
-  command.add_option("--certificate", options.certificate, "PEM file of this client");
-  command.add_option("--key", options.key, "PEM file of its key");
+                     "PEM file: authority of the daemon's certificate; the connection uses TLS; "
+                     "default: MBCOSIM_TLS_CA of the environment");
+  command.add_option("--certificate", options.certificate,
+                     "PEM file of this client; default: MBCOSIM_TLS_CERTIFICATE");
+  command.add_option("--key", options.key, "PEM file of its key; default: MBCOSIM_TLS_KEY");
   command.add_option("--timeout", options.timeout, "Seconds to wait for the daemon")
       ->capture_default_str()
       ->check(NumberCheck::above(0));
@@ -50,11 +64,10 @@ void add_daemon_options(CLI::App& command, DaemonOptions& options) {
 
 client::Server reach(const DaemonOptions& options) {
   check_default_socket(options.address);
-  const client::Credentials credentials{
-      .token = options.token_file.empty() ? options.token : token_of_file(options.token_file),
-      .server_ca = text_of_file(options.ca),
-      .certificate = text_of_file(options.certificate),
-      .key = text_of_file(options.key)};
+  const client::Credentials credentials{.token = token_of(options),
+                                        .server_ca = text_of_file(options.ca),
+                                        .certificate = text_of_file(options.certificate),
+                                        .key = text_of_file(options.key)};
   return client::Server::connect(options.address, options.timeout, credentials);
 }
 

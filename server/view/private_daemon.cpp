@@ -20,10 +20,12 @@ namespace {
 namespace fs = std::filesystem;
 using Clock = std::chrono::steady_clock;
 constexpr std::string_view kOptions =
-    "MBCOSIMD_";  ///< begins variables that are a daemon's options
+    "MBCOSIMD_";                            ///< begins variables that are a daemon's options
+constexpr std::size_t kLongestFolder = 80;  ///< the path of a socket has at most 107 bytes
 
 std::string new_folder() {
   std::string name = (fs::temp_directory_path() / "mbcosim-view-XXXXXX").string();
+  if (name.size() > kLongestFolder) name = "/tmp/mbcosim-view-XXXXXX";
   if (!::mkdtemp(name.data()))
     throw std::system_error(errno, std::generic_category(), "cannot make a folder");
   return name;

@@ -236,6 +236,11 @@ def test_the_daemon_of_a_peer_is_named_as_for_other_commands(start_daemon, progr
         assert "is no signal port" in told("--address", daemon.address, "--token", "a-good-token")
         assert "is no signal port" in told("--token-file", str(secret), **{**by_environment, "MBCOSIM_TOKEN": "another"})
         assert "unknown bearer token" in told("--token", "another", **by_environment)
+        by_file = {"MBCOSIM_ADDRESS": daemon.address, "MBCOSIM_TOKEN_FILE": str(secret)}
+        assert "is no signal port" in told(**by_file)
+        assert "is no signal port" in told(**{**by_environment, "MBCOSIM_TOKEN_FILE": str(empty)})
+        assert "is no signal port" in told("--token", "a-good-token", **{**by_file, "MBCOSIM_TOKEN_FILE": str(empty)})
+        assert "unknown bearer token" in told("--token", "another", **by_file)
         assert f'there is no token in "{empty}"' in told("--token-file", str(empty), **by_environment)
 
 

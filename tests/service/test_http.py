@@ -347,7 +347,7 @@ def test_no_token_and_a_wrong_one_are_refused(door):
 
 def test_the_token_in_the_address_becomes_a_cookie_once(door):
     status, headers, _ = door.request("GET", f"/?token={door.token}", Authorization=None)
-    assert status == 303 and headers["Location"] == "/"
+    assert status == 303 and headers["Location"] == "./"
     cookie, *attributes = headers["Set-Cookie"].split("; ")
     assert {"HttpOnly", "SameSite=Strict"} <= set(attributes)
     assert door.call("Simulations/ListSimulations", Authorization=None, Cookie=f"a=b; {cookie}; c=d")[0] == 200

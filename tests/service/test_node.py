@@ -33,7 +33,7 @@ def run(command, folder, daemon):
 
 def test_its_own_tests(node_client, daemon):
     output = run(["node", "--test", "test/"], node_client, daemon)
-    assert "fail 0" in output and "pass 11" in output
+    assert "fail 0" in output and "pass 12" in output
 
 
 @pytest.mark.parametrize("reconnect", [60, 0])

@@ -173,15 +173,17 @@ def test_the_commands_reach_a_daemon_over_tls(secured, tmp_path):
     certificate(tmp_path, "client", "/CN=arm", "ca")
     files = {"--ca": "ca.pem", "--certificate": "client.pem", "--key": "client.key"}
 
-    def sessions(**changed):
-        arguments = [word for option, file in {**files, **changed}.items() for word in (option, str(tmp_path / file))]
+    def sessions(files, **environment):
+        arguments = [word for option, file in files.items() for word in (option, str(tmp_path / file))]
         return subprocess.run([os.path.join(os.path.dirname(DAEMON), "mbcosim"), "sessions", "--address", address, *arguments],
-                              capture_output=True, text=True, timeout=30 * TIME_FACTOR)
+                              env={**os.environ, **environment}, capture_output=True, text=True, timeout=30 * TIME_FACTOR)
 
-    done = sessions()
-    assert done.returncode == 0 and done.stdout.startswith("simulation"), done
-    missing = sessions(**{"--ca": "none.pem"})
-    assert missing.returncode == 4 and "none.pem" in missing.stderr and missing.stdout == ""
+    variables = {"MBCOSIM_TLS_CA": "ca.pem", "MBCOSIM_TLS_CERTIFICATE": "client.pem", "MBCOSIM_TLS_KEY": "client.key"}
+    variables = {name: str(tmp_path / file) for name, file in variables.items()}
+    for done in (sessions(files), sessions({}, **variables), sessions({"--ca": "ca.pem"}, **{**variables, "MBCOSIM_TLS_CA": "none.pem"})):
+        assert done.returncode == 0 and done.stdout.startswith("simulation"), done
+    for missing in (sessions({**files, "--ca": "none.pem"}), sessions({}, **{**variables, "MBCOSIM_TLS_CA": "none.pem"})):
+        assert missing.returncode == 4 and "none.pem" in missing.stderr and missing.stdout == ""
 
 
 def test_health_is_asked_over_tls(secured, tmp_path):

@@ -4,6 +4,7 @@ import contextlib
 import functools
 import os
 import signal
+import socket
 import subprocess
 import sys
 import tempfile
@@ -59,14 +60,20 @@ def test_a_private_daemon_lives_as_long_as_its_connection(pendulum):
     assert not running(process) and not os.path.exists(folder)
 
 
-@pytest.mark.parametrize("how", [signal.SIGKILL, signal.SIGTERM, signal.SIGINT])
-def test_a_private_daemon_ends_with_a_program_that_is_killed(how):
-    program = "import mbcosim, time; s = mbcosim.local(); print(s.process_id, flush=True); time.sleep(600)"
-    with subprocess.Popen([sys.executable, "-c", program], stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True) as child:
-        keeper = int(child.stdout.readline())
-        assert running(keeper)
-        child.send_signal(how)
-    wait_for(lambda: not running(keeper))
+BREAKS_OFF = "import mbcosim, os, sys; s = mbcosim.local(); print(s.process_id, s.address, flush=True); sys.stdin.read(); os._exit(1)"
+
+
+@pytest.mark.parametrize("how", [signal.SIGKILL, signal.SIGTERM, signal.SIGINT, "exit"])
+def test_a_private_daemon_ends_with_a_program_that_is_killed_and_leaves_nothing(how):
+    with subprocess.Popen([sys.executable, "-c", BREAKS_OFF], stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True) as child:
+        number, _, path = child.stdout.readline().partition(" unix:")
+        keeper, folder = int(number), os.path.dirname(path)
+        assert running(keeper) and os.path.exists(folder)
+        if how == "exit":
+            child.stdin.close()
+        else:
+            child.send_signal(how)
+    wait_for(lambda: not running(keeper) and not os.path.exists(folder))
 
 
 FORKS = """
@@ -102,8 +109,20 @@ def test_a_private_daemon_that_is_stopped_delays_nobody_for_long():
 
 
 def test_a_private_daemon_that_cannot_start_says_why():
-    with pytest.raises(mbcosim.Unavailable, match="ended with .* before it listened: (.|\n)*--no-such-option"):
+    with pytest.raises(mbcosim.Unavailable, match="ended with .* before it served: (.|\n)*--no-such-option"):
         mbcosim.local("--no-such-option")
+    with socket.create_server(("127.0.0.1", 0)) as taken:  # which is known after the daemon listens
+        port = taken.getsockname()[1]
+        with pytest.raises(mbcosim.Unavailable, match=f"ended with .* before it served: (.|\n)*127.0.0.1:{port}"):
+            mbcosim.local("--http", f"127.0.0.1:{port}")
+
+
+def test_options_of_another_daemon_are_not_those_of_a_private_one(monkeypatch, tmp_path):
+    (tmp_path / "tokens").write_text("a-token control ann\n")
+    monkeypatch.setenv("MBCOSIMD_TOKENS", str(tmp_path / "tokens"))
+    monkeypatch.setenv("MBCOSIMD_NO_SUCH_OPTION", "1")
+    with mbcosim.local() as server:
+        assert server.list() == []
 
 
 def test_a_missing_program_is_named_with_its_remedy(monkeypatch, tmp_path):
@@ -619,7 +638,7 @@ def test_the_ends_of_asynchronous_blocks_hide_nothing(daemon):
 
 def test_what_if_tries_inputs_and_stays_where_it_is(swing, server):
     before = len(server.list())
-    found = swing.what_if({"free": {}, "pushed": {"structural.2.load": [0, 0, 3, 0, 0, 0]}}, ["node.structural.2.X"], until=0.5)
+    found = swing.what_if({"free": {}, "pushed": {"structural.2.load": [0, 0, 3, 0, 0, 0]}}, names(POSITION), until=0.5)
     free, pushed = (found[name]["node.structural.2.X"][-1, 2] for name in ("free", "pushed"))
     assert free < pushed - 0.1 and swing.time == 0 and len(server.list()) == before
 

@@ -105,6 +105,21 @@ def test_options_of_another_daemon_are_not_its_own(view, pendulum, tmp_path, mon
     assert "token=" in view(pendulum).address()
 
 
+def test_a_long_name_of_the_temporary_folder_is_no_hindrance(pendulum, tmp_path):
+    long = tmp_path / ("a" * 100)
+    long.mkdir()
+    shown = View(long, pendulum)
+    try:
+        assert "token=" in shown.address()
+        with open(f"/proc/{shown.daemon()}/cmdline") as command:
+            folder = os.path.dirname(re.search("unix:([^\0]+)", command.read()).group(1))
+        assert os.path.dirname(folder) == "/tmp" and os.stat(folder).st_mode & 0o777 == 0o700
+    finally:
+        shown.process.terminate()
+        shown.process.communicate(timeout=30 * TIME_FACTOR)
+    assert not os.path.exists(folder) and not os.listdir(long)
+
+
 def test_a_daemon_that_ends_is_told(view, pendulum):
     shown = view(pendulum)
     shown.address()

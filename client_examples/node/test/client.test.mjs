@@ -167,6 +167,22 @@ test("a server that accepts connections and says nothing is not waited for, for 
     await assert.rejects(loadText(other, body), /UNAVAILABLE: the server at .* accepts connections and does not answer/);
   }));
 
+test("nothing goes out through a connection that is closed", async () => {
+  const other = connect(process.env.MBCOSIM_ADDRESS, { reconnect: 600 }), closed = { code: 14, message: "14 UNAVAILABLE: the connection is closed" };
+  const simulation = await loadText(other, body), stepper = await simulation.stepper();
+  await stepper.step();
+  other.close();
+  for (const ask of [() => simulation.step(), () => simulation.stepper(), () => simulation.geometry().next(), () => loadText(other, body), () => stepper.step()])
+    await assert.rejects(ask, closed, String(ask));
+  stepper.close();
+  await new Simulation(server, simulation.info).delete();
+  await beforeSilence(async (silent) => {
+    const waits = loadText(silent, body);
+    setTimeout(silent.close, 100);
+    await assert.rejects(waits, closed);
+  });
+});
+
 test("every call takes a deadline as its last argument", async () => {
   await beforeSilence(async (other) => {
     const there = new Simulation(other, { name: "simulations/none" }), first = (messages) => messages.next();

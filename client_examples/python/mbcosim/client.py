@@ -3,6 +3,7 @@ from __future__ import annotations
 
 import contextlib
 import threading
+from collections.abc import Callable
 from typing import Any, Optional, TypeVar
 
 import grpc
@@ -43,8 +44,8 @@ def connect(address: Optional[str] = None, *, token: Optional[str] = None, tls: 
     return server
 
 
-def await_answer(server: Server, timeout: Optional[float]) -> simulations_pb2.GetServerInfoReply:
-    """Waits until a server answers; see access.Attempts."""
+def await_answer(server: Server, timeout: Optional[float], check: Callable[[], object] = lambda: None) -> simulations_pb2.GetServerInfoReply:
+    """Waits until a server answers; see access.Attempts. `check` raises when there is nobody to wait for."""
     attempts = access.Attempts(server.address, timeout)
 
     def ask(seconds: float, waits: bool) -> simulations_pb2.GetServerInfoReply:
@@ -57,6 +58,7 @@ def await_answer(server: Server, timeout: Optional[float]) -> simulations_pb2.Ge
         try:
             return ask(attempts.left(), waits=False)
         except Unavailable as error:
+            check()
             attempts.again(error)
         # gRPC looks after its connections while a call waits; in a pause without one, only every 5 s.
         with contextlib.suppress(Unavailable):

@@ -251,8 +251,8 @@ class Histories:
 
             simulation.what_if({"open": {"valve": 1.0}, "closed": {"valve": 0.0}}, ["node.structural.8.X"], until=2.0)
         """
-        found = {}
+        found, wanted = {}, outputs if outputs is None or isinstance(outputs, str) else list(outputs)
         for name, inputs in cases.items():
             with self.fork(name=name) as branch:
-                found[name] = branch.simulate(outputs, inputs=inputs, **options)
+                found[name] = branch.simulate(wanted, inputs=inputs, **options)
         return found

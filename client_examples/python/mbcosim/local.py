@@ -17,7 +17,18 @@ from .errors import Unavailable
 from .rpc import PARTING
 
 # The shell ends the daemon when this process writes a line, closes the pipe or dies, however it dies; its own end is that of the daemon.
-_KEEPER = 'exec 3<&0; "$@" </dev/null 3<&- & child=$!; (read -r _ <&3; kill "$child") 2>/dev/null & wait "$child"'
+# Where nobody wrote a line nobody is left to remove the folder, $0.
+_KEEPER = r'''
+exec 3<&0
+"$@" </dev/null 3<&- &
+child=$! left=
+trap left=1 HUP
+(read -r _ <&3 || kill -HUP "$$"; kill "$child") 2>/dev/null &
+wait "$child"
+code=$?
+[ -z "$left" ] || { wait "$child"; rm -rf "$0"; }
+exit "$code"
+'''
 
 
 def local(*options: str, program: Optional[Path] = None, timeout: float = 30.0) -> LocalServer:
@@ -26,7 +37,7 @@ def local(*options: str, program: Optional[Path] = None, timeout: float = 30.0) 
         with mbcosim.local() as server, server.load("pendulum.mbd") as pendulum:
             pendulum.run_until(1.0)
 
-    options  of the daemon: "--workers", "2"
+    options  of the daemon: "--workers", "2"; variables MBCOSIMD_… of the environment are of others
     program  path of `mbcosimd`; default: of $MBCOSIM_BIN, of the build, or on the PATH
     timeout  seconds until it must answer
     """
@@ -44,13 +55,20 @@ class _Daemon:
             self.folder = pathlib.Path(tempfile.mkdtemp(prefix="mbcosim-", dir="/tmp"))
         self.address = f"unix:{self.folder}/s"
         command = [program, "--listen", self.address, "--log-level", "warn", "--shutdown-grace", "1", *options]
+        environment = {name: value for name, value in os.environ.items() if not name.startswith("MBCOSIMD_")}  # those are of another daemon
         with open(self.folder / "log", "wb") as log:
-            self.process = subprocess.Popen(["/bin/sh", "-c", _KEEPER, "sh", *command], stdin=subprocess.PIPE, stdout=subprocess.DEVNULL,
-                                            stderr=log, start_new_session=True)
+            self.process = subprocess.Popen(["/bin/sh", "-c", _KEEPER, str(self.folder), *command], stdin=subprocess.PIPE, stdout=subprocess.DEVNULL,
+                                            stderr=log, env=environment, start_new_session=True)
 
     def log(self) -> str:
         """The end of what it wrote."""
         return (self.folder / "log").read_text(errors="replace").strip()[-2000:]
+
+    def check(self) -> None:
+        """Unavailable with what it wrote where it has ended."""
+        code = self.process.poll()
+        if code is not None:
+            raise Unavailable(f"the daemon ended with {code} before it served: {self.log()}")
 
     def stop(self) -> None:
         """Ends it and removes its folder, unless this is a process that was forked from the one that started it."""
@@ -77,16 +95,14 @@ class LocalServer(Server):
         try:
             self._await_socket(time.monotonic() + timeout)
             super().__init__(self._daemon.address)
-            await_answer(self, timeout)
+            await_answer(self, timeout, self._daemon.check)  # one that cannot serve HTTP, say, ends after it listened
         except Exception:
             self._stop()
             raise
 
     def _await_socket(self, end: float) -> None:
         while not os.path.exists(self._daemon.address[len("unix:"):]):
-            code = self._daemon.process.poll()
-            if code is not None:
-                raise Unavailable(f"the daemon ended with {code} before it listened: {self._daemon.log()}")
+            self._daemon.check()
             if time.monotonic() > end:
                 raise Unavailable(f"the daemon did not listen in time: {self._daemon.log()}")
             time.sleep(0.005)

@@ -166,6 +166,23 @@ export function ask(url: string, headers: Record<string, string> = {}, body?: st
   });
 }
 
+/** Passes on what is asked for under `prefix`, without it, as proxies do. */
+export async function proxy(target: string, prefix: string): Promise<{ origin: string; close(): void }> {
+  const server = createServer((asked, reply) => {
+    if (!asked.url?.startsWith(`${prefix}/`)) return void reply.writeHead(404).end();
+    const headers = { ...asked.headers, host: new URL(target).host, ...(asked.headers.origin && { origin: target }) };
+    const passed = request(target + asked.url.slice(prefix.length), { method: asked.method, headers }, (answer) => {
+      reply.writeHead(answer.statusCode ?? 502, answer.headers);
+      answer.pipe(reply);
+    });
+    passed.on('error', () => reply.destroy());
+    reply.on('close', () => passed.destroy());
+    asked.pipe(passed);
+  });
+  await new Promise<void>((resolve) => server.listen(0, '127.0.0.1', resolve));
+  return { origin: `http://127.0.0.1:${(server.address() as { port: number }).port}`, close: () => void server.close().closeAllConnections() };
+}
+
 /** A unary call in JSON. */
 async function call<T>(origin: string, token: string | undefined, method: string, content: object): Promise<T> {
   const { status, text } = await ask(`${origin}/mbcosim.v1.${method}`, { 'Content-Type': 'application/json', Authorization: `Bearer ${token}` }, JSON.stringify(content));
@@ -206,12 +223,12 @@ export interface Visit {
 
 /** With `MBCOSIM_PAGE`, that file is shown in place of the daemon's page: tries a page without a new daemon. */
 async function prepared(page: Page, address: string): Promise<string> {
-  const file = process.env.MBCOSIM_PAGE, { protocol, origin, search, hash } = new URL(address);
+  const file = process.env.MBCOSIM_PAGE, { protocol, origin, pathname, search, hash } = new URL(address);
   if (!file || protocol === 'file:') return address;
   if (search) await page.goto(address);  // the token becomes a cookie
   await page.goto('about:blank');
-  await page.route((url) => url.origin === origin && url.pathname === '/', (route) => route.fulfill({ contentType: 'text/html', body: readFileSync(file, 'utf8') }));
-  return `${origin}/${hash}`;
+  await page.route((url) => url.origin === origin && url.pathname === pathname, (route) => route.fulfill({ contentType: 'text/html', body: readFileSync(file, 'utf8') }));
+  return `${origin}${pathname}${hash}`;
 }
 
 /** Opens an address in a fresh profile. */

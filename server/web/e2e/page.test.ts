@@ -6,7 +6,7 @@ import { createRequire } from 'node:module';
 import { tmpdir } from 'node:os';
 import { dirname, join } from 'node:path';
 import { afterAll, beforeAll, describe, expect, test } from 'vitest';
-import { ask, atStep, create, curvesDrawn, Daemon, decks, drawCalls, drawnLayers, FACTOR, follows, frameRate, freePort, hide, launch, MODELS, moveSliderUnderSample, newTab, picture, recorded, rested, samplesHave, samplesReach, scene, shown, turnTo, until, View, visit, withPage, type Visit } from './bench';
+import { ask, atStep, create, curvesDrawn, Daemon, decks, drawCalls, drawnLayers, FACTOR, follows, frameRate, freePort, hide, launch, MODELS, moveSliderUnderSample, newTab, picture, proxy, recorded, rested, samplesHave, samplesReach, scene, shown, turnTo, until, View, visit, withPage, type Visit } from './bench';
 
 let browser: Browser;
 beforeAll(async () => {
@@ -580,7 +580,8 @@ describe('what is shown of a simulation that changes', () => {
       await page.getByRole('tab', { name: 'Simulations' }).click();
       const row = page.locator('.list .name', { hasText: 'heavy_top.mbd' }), mine = page.locator('.list .card.current .name');
       await row.waitFor();
-      for (const [simulation, name] of [[view.simulation, mine], [other, row]] as const) {
+      const renamed = (simulation: string, displayName: string) => view.call('Simulations/UpdateSimulation', { simulation, displayName });
+      for (const [simulation, name, called] of [[view.simulation, mine, 'first'], [other, row, 'second, heavy_top.mbd']] as const) {
         if (name === mine) await name.focus();
         else {
           await name.hover();
@@ -588,11 +589,21 @@ describe('what is shown of a simulation that changes', () => {
         }
         const { time } = await view.call<{ time: number }>('Simulations/Step', { simulation, steps: 10 });
         await name.getByText(`ready, ${time} s`).waitFor();
+        await renamed(simulation, called);
+        await name.getByText(called).waitFor();
         expect(await focused(page)).toBe(await name.textContent());
       }
       await page.mouse.up();
       await atStep(page, 10);
       await until(page, (name) => location.hash.includes(encodeURIComponent(name)), other);
+      await until(page, (title) => document.title === title, 'second, heavy_top.mbd – mbcosim');
+      await renamed(other, 'heavy_top.mbd');
+      await until(page, (title) => document.title === title, 'heavy_top.mbd – mbcosim');
+      await page.getByRole('tab', { name: 'Simulations' }).click();
+      const question = page.waitForEvent('dialog');
+      const [asked] = await Promise.all([question, question.then((dialog) => dialog.dismiss()), button(page, 'Delete first').click()]);
+      expect(asked.message()).toBe('Delete the simulation first?');
+      expect(await button(page, 'Compare with first').count()).toBe(1);
       await view.call('Simulations/DeleteSimulation', { simulation: view.simulation });
       await mine.getByText('heavy_top.mbd').waitFor({ state: 'attached' });
       await until(page, () => document.querySelectorAll('.left .list li').length === 1, undefined);
@@ -714,10 +725,26 @@ describe('solver and events', () => {
 });
 
 describe('a deck from the disk', () => {
-  test('is loaded with the files that it includes', async () => {
-    await withPage(browser, 'pendulum.mbd', async ({ page }, view) => {
+  test('is loaded with the files that it includes, once it is chosen, though the connection is lost meanwhile', async () => {
+    await withPage(browser, 'pendulum.mbd', async ({ page, faults }, view) => {
       await page.evaluate(() => (document.querySelector('.empty') as HTMLElement).classList.remove('hidden'));
-      await page.getByLabel('Files of a deck').setInputFiles([`${MODELS}/cantilever_dead_load.mbd`, `${MODELS}/cantilever.inc`]);
+      const lists = '**/mbcosim.v1.Simulations/ListSimulations', listed = () => page.waitForResponse(lists);
+      const lose = async () => {
+        const lost = new Promise<void>((resolve) => void page.route(lists, (route) => route.abort('connectionreset').then(resolve)));
+        await lost;
+        await page.unroute(lists);
+      };
+      await lose();
+      await page.getByLabel('Files of a deck').setInputFiles(['cantilever_dead_load.mbd', 'cantilever.inc', 'pendulum.mbd'].map((name) => `${MODELS}/${name}`));
+      const question = page.getByText('Which of them is the main file?');
+      await question.waitFor();
+      await listed();
+      await lose();
+      await listed();
+      await listed();
+      expect(await question.isVisible()).toBe(true);
+      expect(faults.splice(0).join()).toContain('ERR_CONNECTION_RESET');
+      await page.getByRole('main').getByRole('button', { name: 'cantilever_dead_load.mbd' }).click();
       await until(page, (name) => location.hash.includes('simulation=') && !location.hash.includes(encodeURIComponent(name)), view.simulation);
       await shown(page);
       expect(await page.title()).toBe('cantilever_dead_load.mbd – mbcosim');
@@ -795,7 +822,7 @@ describe('who comes in', () => {
   test('without the token the page says what to do', async () => {
     const view = await View.start('pendulum.mbd');
     const visited = await visit(browser, `${view.origin}/`);
-    const words = visited.page.getByText('Open the address that the daemon printed');
+    const words = visited.page.getByText('Open the address that the daemon printed when it started; where that has no token, with yours behind it: ?token=YOURS.');
     await words.waitFor();
     const said = await words.elementHandle();
     for (let i = 0; i < 2; ++i) await visited.page.waitForResponse('**/mbcosim.v1.Simulations/ListSimulations');
@@ -804,15 +831,22 @@ describe('who comes in', () => {
     await view.stop();
   });
 
-  test('a reload shows the simulation where it stands', async () => {
-    await withPage(browser, 'pendulum.mbd', async (visited, view) => {
-      await visited.page.getByRole('button', { name: '+10' }).click();
-      await atStep(visited.page, 10);
-      await visited.page.reload();
-      await shown(visited.page);
-      await atStep(visited.page, 10);
-      await expectSceneOf(visited, view);
-    });
+  test('a reload shows the simulation where it stands, behind a proxy with a prefix too', async () => {
+    const view = await View.start('pendulum.mbd'), between = await proxy(view.origin, '/mb');
+    const visited = await visit(browser, view.address.replace(`${view.origin}/`, `${between.origin}/mb/`));
+    await shown(visited.page);
+    await visited.page.getByRole('button', { name: '+10' }).click();
+    await atStep(visited.page, 10);
+    await visited.page.reload();
+    await shown(visited.page);
+    await atStep(visited.page, 10);
+    await follows(visited.page);
+    await expectSceneOf(visited, view);
+    expect(visited.page.url()).toContain('/mb/#simulation=');
+    expect(visited.faults).toEqual([]);
+    await visited.close();
+    between.close();
+    await view.stop();
   });
 });
 
@@ -855,7 +889,7 @@ describe('a daemon that is started again with another token', () => {
       await daemon.kill();
       await page.getByText('The daemon does not answer; trying again.').waitFor();
       await daemon.start();
-      await page.locator('.banner').getByText('Open the address that the daemon printed when it started: it has the token.').waitFor();
+      await page.locator('.banner').getByText('Open the address that the daemon printed when it started;').waitFor();
     }, { openSocket: true });
   });
 });

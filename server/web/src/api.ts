@@ -1,4 +1,4 @@
-/** The service as the page calls it: Connect over the origin that served the page. */
+/** The service as the page calls it: Connect beside the page, which a proxy may serve under a prefix. */
 import { fromBinary } from '@bufbuild/protobuf';
 import { Code, ConnectError, createClient } from '@connectrpc/connect';
 import { createConnectTransport } from '@connectrpc/connect-web';
@@ -10,7 +10,8 @@ import { Telemetry } from './gen/mbcosim/v1/telemetry_pb';
 import { newRequestId, repeatable } from './requests';
 import { chunks, type NamedFile } from './upload';
 
-const transport = createConnectTransport({ baseUrl: globalThis.location?.origin ?? '', useBinaryFormat: true, interceptors: [repeatable] });
+const { origin = '', pathname = '' } = globalThis.location ?? {};
+const transport = createConnectTransport({ baseUrl: origin + pathname.replace(/[^/]*$/, ''), useBinaryFormat: true, interceptors: [repeatable] });
 
 export const simulations = createClient(Simulations, transport);
 export const telemetry = createClient(Telemetry, transport);
@@ -44,7 +45,7 @@ function errorInfo(error: ConnectError) {
 
 /** What to do about it, where there is something. */
 export function remedy(failure: Failure): string {
-  return failure.reason === 'UNAUTHENTICATED' ? 'Open the address that the daemon printed when it started: it has the token.' : '';
+  return failure.reason === 'UNAUTHENTICATED' ? 'Open the address that the daemon printed when it started; where that has no token, with yours behind it: ?token=YOURS.' : '';
 }
 
 export function failureOf(thrown: unknown): Failure {

@@ -49,7 +49,7 @@ export class App {
     root.replaceChildren(this.shell);
     this.fillLeft();
     this.setTheme((localStorageGet('theme') ?? (matchMedia('(prefers-color-scheme: light)').matches ? 'light' : 'dark')) as 'dark' | 'light');
-    this.desk.shown.watch((shown) => this.connect(shown));
+    this.desk.shown.watch(() => this.connect());
     document.addEventListener('keydown', (event) => this.key(event));
     if (recorded) this.desk.show(recorded);
     else void this.start();
@@ -168,11 +168,9 @@ export class App {
 
   // ---- what changes
 
-  private connect(shown: Shown | undefined): void {
+  private connect(): void {
     this.unwatch.forEach((end) => end());
     const session = this.desk.session;
-    this.name.textContent = shown?.title ?? '';
-    document.title = shown ? `${shown.title} – mbcosim` : 'mbcosim';
     this.unwatch = session
       ? [session.info.watch(() => this.updateState()), session.lost.watch(() => this.updateState()), session.gone.watch(() => this.updateState()), session.failure.watch(() => this.updateState())]
       : [];
@@ -180,7 +178,9 @@ export class App {
   }
 
   private updateState(): void {
-    const session = this.desk.session;
+    const session = this.desk.session, title = this.desk.shown.value?.title;
+    if (this.name.textContent !== (title ?? '')) this.name.textContent = title ?? '';
+    document.title = title === undefined ? 'mbcosim' : `${title} – mbcosim`;
     this.chip.classList.toggle('hidden', !this.desk.shown.value);
     if (!session) {
       this.chip.className = `chip${this.desk.shown.value ? '' : ' hidden'}`;

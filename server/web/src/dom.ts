@@ -64,6 +64,11 @@ export function iconButton(name: string, label: string, action: () => void, attr
   return h('button', { type: 'button', class: 'icon-button', title: label, 'aria-label': label, onclick: action, ...attributes }, icon(name));
 }
 
+/** Calls a button with an icon something else. */
+export function rename(button: Element, label: string): void {
+  for (const attribute of ['title', 'aria-label']) if (button.getAttribute(attribute) !== label) button.setAttribute(attribute, label);
+}
+
 /** Offers `data` as a file. */
 export function download(name: string, data: Blob): void {
   const address = URL.createObjectURL(data);

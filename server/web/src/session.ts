@@ -184,6 +184,7 @@ export class Session implements Shown {
       this.following = true;
       const layout = this.layout;
       try {
+        if (this.ended.signal.aborted) return;  // in the moment in which it got the place
         const batches = telemetry.subscribe(
           { simulation: this.name, handles: [...layout.handles], minimumInterval: duration(shortestInterval(layout)), policy: OverflowPolicy.DROP_OLDEST, bufferSamples: 64 },
           { signal: this.stream.signal },
@@ -192,11 +193,11 @@ export class Session implements Shown {
         return;  // the simulation is deleted
       } catch (thrown) {
         if (this.ended.signal.aborted) return;
-        if (!this.stream.signal.aborted) await pause(RETRY_MILLISECONDS);
       } finally {
         this.following = false;
         place.release();
       }
+      if (!this.stream.signal.aborted) await pause(RETRY_MILLISECONDS);
     }
   }
 
@@ -212,14 +213,15 @@ export class Session implements Shown {
       if (!place) return;
       this.eventStream = new AbortController();
       try {
+        if (this.ended.signal.aborted) return;
         await this.readEvents(this.eventStream.signal);
         return;  // the simulation is deleted
       } catch {
         if (this.ended.signal.aborted) return;
-        if (!this.eventStream.signal.aborted) await pause(RETRY_MILLISECONDS);
       } finally {
         place.release();
       }
+      if (!this.eventStream.signal.aborted) await pause(RETRY_MILLISECONDS);
     }
   }
 

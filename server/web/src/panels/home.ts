@@ -1,7 +1,7 @@
 /** The list of simulations, and where a deck is dropped. */
 import { failureOf, loadDeck, remedy, simulations, type Failure } from '../api';
 import type { Desk } from '../desk';
-import { h, icon, iconButton } from '../dom';
+import { h, icon, iconButton, rename } from '../dom';
 import { number } from '../format';
 import { SimulationState, type SimulationInfo } from '../gen/mbcosim/v1/simulations_pb';
 import { listSimulations } from '../questions';
@@ -20,10 +20,16 @@ export const STATES: Record<number, string> = {
 
 /** A simulation in the list. */
 interface Row {
+  info: SimulationInfo;
   element: HTMLLIElement;
+  name: HTMLElement;
   state: HTMLElement;
   compare: HTMLElement;
+  remove: HTMLElement;
 }
+
+/** What the message is about. A connection that is lost is told in place of a failure, and no longer than it is lost. */
+type About = 'nothing' | 'deck' | 'failure' | 'connection';
 
 export class Home {
   /** The list for the left-hand side. */
@@ -31,6 +37,7 @@ export class Home {
   /** What stands in place of the scene while nothing is shown. */
   readonly welcome = h('div', { class: 'empty' });
   private readonly message = h('div', { 'aria-live': 'polite' });
+  private about: About = 'nothing';
   private readonly none = h('li', { class: 'soft' }, 'No simulation yet.');
   private readonly rows = new Map<string, Row>();
   private known: SimulationInfo[] = [];
@@ -71,20 +78,20 @@ export class Home {
   private async load(files: NamedFile[], main?: string): Promise<void> {
     const mains = main ? [main] : mainFiles(files);
     if (mains.length !== 1) return this.choose(files, mains);
-    this.message.replaceChildren(h('p', { class: 'soft' }, `Loading ${mains[0]} …`));
+    this.say('deck', h('p', { class: 'soft' }, `Loading ${mains[0]} …`));
     try {
       const name = await loadDeck(files, mains[0]);
-      this.message.replaceChildren();
+      this.say('nothing');
       this.open(name);
     } catch (thrown) {
-      this.tell(failureOf(thrown), '', files);
+      this.tell(failureOf(thrown), files);
     }
   }
 
   private choose(files: NamedFile[], mains: string[]): void {
     this.welcome.classList.remove('hidden');
-    if (mains.length === 0) return this.message.replaceChildren(h('div', { class: 'diagnostic' }, 'None of these files is a deck: a deck has a card "begin: data;".'));
-    this.message.replaceChildren(h('p', {}, 'Which of them is the main file?'),
+    if (mains.length === 0) return this.say('deck', h('div', { class: 'diagnostic' }, 'None of these files is a deck: a deck has a card "begin: data;".'));
+    this.say('deck', h('p', {}, 'Which of them is the main file?'),
       ...mains.map((path) => h('button', { type: 'button', class: 'button', onclick: () => void this.load(files, path) }, path)));
   }
 
@@ -99,24 +106,29 @@ export class Home {
   async refresh(): Promise<SimulationInfo[]> {
     try {
       this.known = await listSimulations();
-      if (this.message.dataset.kind === 'connection') this.message.replaceChildren();
+      if (this.about === 'connection') this.say('nothing');
       this.draw();
     } catch (thrown) {
-      this.tell(failureOf(thrown), 'connection');
+      if (this.about !== 'deck') this.tell(failureOf(thrown), [], 'connection');
     }
     return this.known;
   }
 
-  tell(failure: Failure, kind = '', files: readonly NamedFile[] = []): void {
-    this.message.dataset.kind = kind;
+  private say(about: About, ...words: Node[]): void {
+    this.about = about;
+    this.message.replaceChildren(...words);
+  }
+
+  tell(failure: Failure, files: readonly NamedFile[] = [], about: About = failure.diagnostics.length > 0 ? 'deck' : 'failure'): void {
     const hint = remedy(failure);
-    if (kind !== 'connection' || !this.desk.shown.value) this.welcome.classList.remove('hidden');
+    if (about !== 'connection' || !this.desk.shown.value) this.welcome.classList.remove('hidden');
     const back = h('button', { type: 'button', class: 'button', onclick: () => this.welcome.classList.add('hidden') }, 'Back to the simulation');
     const said = h('div', {},
       this.desk.shown.value ? back : '',
       failure.diagnostics.length === 0 ? h('div', { class: 'diagnostic' }, h('strong', {}, failure.message), hint && h('p', {}, hint)) : '',
       diagnosticsList(failure.diagnostics, files));
-    if (kind !== 'connection' || said.innerHTML !== this.message.innerHTML) this.message.replaceChildren(...said.childNodes);  // is read aloud once
+    this.about = about;
+    if (about !== 'connection' || said.innerHTML !== this.message.innerHTML) this.message.replaceChildren(...said.childNodes);  // is read aloud once
   }
 
   /** What stays in the list stays in its place: it may have the focus, or be pressed. */
@@ -125,6 +137,7 @@ export class Home {
     const elements = this.known.map((info) => {
       const row = this.rows.get(info.name) ?? this.row(info), text = `${STATES[info.state] ?? 'unknown'}, ${number(info.time, 5)} s, ${info.owner}`;
       this.rows.set(info.name, row);
+      this.name(row, info);
       row.element.classList.toggle('current', info.name === current);
       row.compare.classList.toggle('hidden', !current || info.name === current);
       if (row.state.textContent !== text) row.state.textContent = text;
@@ -138,12 +151,23 @@ export class Home {
 
   private row(info: SimulationInfo): Row {
     const state = h('div', { class: 'soft' });
-    const compare = iconButton('eye', `Compare with ${info.displayName || info.name}`, () => this.compare(info.name), { class: 'icon-button small' });
+    const compare = iconButton('eye', '', () => this.compare(info.name), { class: 'icon-button small' });
+    const name = h('div'), remove = iconButton('trash', '', () => void this.remove(row.info), { class: 'icon-button small' });
     const element = h('li', { class: 'card' },
       h('button', { type: 'button', class: 'name body', style: 'background:none;border:0;text-align:left;cursor:pointer;padding:0', onclick: () => this.open(info.name) },
-        h('div', {}, info.displayName || info.name.replace('simulations/', '')), state),
-      compare, iconButton('trash', `Delete ${info.displayName || info.name}`, () => void this.remove(info), { class: 'icon-button small' }));
-    return { element, state, compare };
+        name, state),
+      compare, remove);
+    const row = { info, element, name, state, compare, remove };
+    return row;
+  }
+
+  /** Its name may have changed. */
+  private name(row: Row, info: SimulationInfo): void {
+    const name = info.displayName || info.name.replace('simulations/', ''), whole = info.displayName || info.name;
+    row.info = info;
+    if (row.name.textContent !== name) row.name.textContent = name;
+    rename(row.compare, `Compare with ${whole}`);
+    rename(row.remove, `Delete ${whole}`);
   }
 
   private async remove(info: SimulationInfo): Promise<void> {

@@ -1,0 +1,62 @@
+import { describe, expect, test, vi } from 'vitest';
+import { Session } from '../src/session';
+
+/** Streams of samples and of events that were begun; places that are held. */
+const begun: AbortSignal[] = [];
+let held = 0, given = 0, refused = false, close = () => {};
+
+async function* stream(_: object, { signal }: { signal: AbortSignal }): AsyncGenerator<never> {
+  begun.push(signal);
+  if (refused) throw new Error('too many streams');
+  await new Promise((_, reject) => signal.addEventListener('abort', reject));
+}
+
+vi.mock('../src/api', () => ({
+  failureOf: () => ({ message: '', reason: '', metadata: {}, diagnostics: [], cancelled: true }),
+  simulations: { readVariables: async () => ({ step: 0n, time: 0, values: [] }), listSnapshots: async () => ({ snapshots: [] }) },
+  telemetry: { subscribe: stream },
+  events: { watchEvents: stream },
+}));
+vi.mock('../src/questions', () => ({
+  look: async (name: string) => ({ name, state: 0, step: 0n, time: 0, waits: [] }),
+  describe: async () => ({ title: '', nodes: [], elements: [], variables: [], symbols: [] }),
+}));
+vi.mock('../src/model', () => ({ modelOf: () => ({ title: '', variables: [] }) }));
+vi.mock('../src/load_geometry', () => ({ loadGeometry: async () => ({ geometry: { nodes: [], elements: [], bodies: [] }, cards: new Map() }) }));
+vi.mock('../src/places', () => ({
+  pause: () => new Promise(() => {}),
+  placeToFollow: async (_: string, wanted: () => boolean) => {
+    await new Promise((later) => setTimeout(later));
+    if (!wanted()) return undefined;
+    ++held;
+    ++given;
+    close();
+    return { release: () => --held };
+  },
+}));
+
+describe('a simulation on the screen', () => {
+  test('has a place for each of its streams until it is closed', async () => {
+    const session = await Session.open('simulations/1');
+    await vi.waitFor(() => expect([held, begun.length]).toEqual([2, 2]));
+    session.close();
+    await vi.waitFor(() => expect(held).toBe(0));
+    expect(begun.splice(0).every((signal) => signal.aborted)).toBe(true);
+  });
+
+  test('that is closed in the moment in which it gets a place holds none and begins no stream', async () => {
+    const session = await Session.open('simulations/1');
+    given = 0;
+    close = () => session.close();
+    await vi.waitFor(() => expect([given, held]).toEqual([1, 0]));
+    expect(begun).toEqual([]);
+    close = () => {};
+  });
+
+  test('leaves a place to others while its stream is refused', async () => {
+    refused = true;
+    const session = await Session.open('simulations/1');
+    await vi.waitFor(() => expect([held, begun.length]).toEqual([0, 2]));
+    session.close();
+  });
+});
