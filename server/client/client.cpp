@@ -15,7 +15,15 @@ namespace {
 
 constexpr std::size_t kChunkBytes = 1 << 20;
 
+[[noreturn]] void refuse(const char* why, const char* field) {
+  throw Error(why, static_cast<int>(grpc::StatusCode::INVALID_ARGUMENT), "BAD_ARGUMENT", {}, field);
+}
+
 std::shared_ptr<grpc::ChannelCredentials> channel_credentials(const Credentials& credentials) {
+  if (credentials.certificate.empty() != credentials.key.empty())
+    refuse("a certificate and its key belong together", "certificate");
+  if (credentials.server_ca.empty() && !credentials.certificate.empty())
+    refuse("a certificate is shown over TLS: name the authority of the server's, too", "server_ca");
   if (credentials.server_ca.empty()) return grpc::InsecureChannelCredentials();
   return grpc::SslCredentials({credentials.server_ca, credentials.key, credentials.certificate});
 }

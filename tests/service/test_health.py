@@ -315,7 +315,8 @@ def test_who_asks_metrics_for_nothing_holds_up_nobody(start_daemon):
     with contextlib.closing(socket.socket()) as free:
         free.bind(("127.0.0.1", 0))
         address = free.getsockname()
-    start_daemon("--metrics", f"{address[0]}:{address[1]}")
+    daemon = start_daemon("--metrics", f"{address[0]}:{address[1]}")
+    wait_for(lambda: "listening on unix" in daemon.log())
     with contextlib.ExitStack() as stack:
         for _ in range(8):
             stack.enter_context(socket.create_connection(address, 20 * TIME_FACTOR))

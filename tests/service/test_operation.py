@@ -184,6 +184,9 @@ def test_the_commands_reach_a_daemon_over_tls(secured, tmp_path):
         assert done.returncode == 0 and done.stdout.startswith("simulation"), done
     for missing in (sessions({**files, "--ca": "none.pem"}), sessions({}, **{**variables, "MBCOSIM_TLS_CA": "none.pem"})):
         assert missing.returncode == 4 and "none.pem" in missing.stderr and missing.stdout == ""
+    for lacking, told in (("--ca", "name the authority of the server's"), ("--key", "belong together")):
+        refused = sessions({option: file for option, file in files.items() if option != lacking})
+        assert refused.returncode == 4 and told in refused.stderr, refused
 
 
 def test_health_is_asked_over_tls(secured, tmp_path):
