@@ -833,20 +833,23 @@ describe('who comes in', () => {
 
   test('a reload shows the simulation where it stands, behind a proxy with a prefix too', async () => {
     const view = await View.start('pendulum.mbd'), between = await proxy(view.origin, '/mb');
-    const visited = await visit(browser, view.address.replace(`${view.origin}/`, `${between.origin}/mb/`));
-    await shown(visited.page);
-    await visited.page.getByRole('button', { name: '+10' }).click();
-    await atStep(visited.page, 10);
-    await visited.page.reload();
-    await shown(visited.page);
-    await atStep(visited.page, 10);
-    await follows(visited.page);
-    await expectSceneOf(visited, view);
-    expect(visited.page.url()).toContain('/mb/#simulation=');
-    expect(visited.faults).toEqual([]);
-    await visited.close();
-    between.close();
-    await view.stop();
+    try {
+      const visited = await visit(browser, view.address.replace(`${view.origin}/`, `${between.origin}/mb/`));
+      await shown(visited.page);
+      await visited.page.getByRole('button', { name: '+10' }).click();
+      await atStep(visited.page, 10);
+      await visited.page.reload();
+      await shown(visited.page);
+      await atStep(visited.page, 10);
+      await follows(visited.page);
+      await expectSceneOf(visited, view);
+      expect(visited.page.url()).toContain('/mb/#simulation=');
+      expect(visited.faults).toEqual([]);
+      await visited.close();
+    } finally {
+      between.close();
+      await view.stop();
+    }
   });
 });
 
