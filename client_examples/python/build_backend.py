@@ -47,7 +47,7 @@ def _compiler():
         return tools
     raise BuildError(
         "mbcosim: the stubs of the protocol are generated, and for that protoc and grpc_python_plugin are missing:\n"
-        "  apt-get install protobuf-compiler protobuf-compiler-grpc    or    pip install grpcio-tools\n"
+        "  apt-get install protobuf-compiler protobuf-compiler-grpc libprotobuf-dev    or    pip install grpcio-tools\n"
         "A wheel made on another machine (pip wheel --no-deps client_examples/python) has them inside.")
 
 

@@ -5,7 +5,9 @@
 #include <openssl/sha.h>
 
 #include <algorithm>
+#include <cerrno>
 #include <charconv>
+#include <cstring>
 #include <filesystem>
 #include <fstream>
 #include <sstream>
@@ -100,8 +102,8 @@ Authenticator::Tokens Authenticator::read(const std::string& path) {
   check_trusted("the tokens file", path);
   std::ifstream file(path);
   if (!file || std::filesystem::is_directory(path))
-    throw std::runtime_error("cannot read the tokens file" +
-                             std::string(file ? ": " + path + " is a folder" : ""));
+    throw std::runtime_error("cannot read the tokens file " + path + ": " +
+                             (file ? "it is a folder" : std::strerror(errno)));
   Tokens result;
   std::string line;
   for (int number = 1; std::getline(file, line); ++number) {

@@ -64,6 +64,9 @@ def test_the_programs_find_each_other(root, tmp_path):
     assert "FMI 2.0" in run(program, "fmu", "pendulum.mbd", "-o", "p.fmu", "--fmi", 2, "--inputs", "node.structural.2.load", cwd=tmp_path,
                             env=environment)
     assert run(root / "usr" / "bin" / "mbcosimd", "--version") == "mbcosimd 0.1.0\n"
+    for each in (root / "usr" / "bin").iterdir():
+        assert "not found" not in run("ldd", each), each
+    assert "ExecStart=mbcosimd\n" in (root / "usr/lib/systemd/system/mbcosimd.service").read_text()
     assert ".SS plot" in next(root.glob("usr/share/man/man1/mbcosim.1*")).read_text()
     script = (root / "usr/share/bash-completion/completions/mbcosim").read_text()
     assert "complete -o default" in script

@@ -96,7 +96,7 @@ def invocations(root):
                 yield f"kubernetes.yaml, {probe}", container[probe]["exec"]["command"][1:], {}
     unit = (docker / "mbcosimd.service").read_text()
     environment_of_unit = dict(re.findall(r"\b(MBCOSIMD_\w+)=(\S+)", " ".join(re.findall(r"^Environment=(.*)$", unit, re.MULTILINE))))
-    for line in re.findall(r"^#? *ExecStart=(/.*)$", unit, re.MULTILINE):
+    for line in re.findall(r"^#? *ExecStart=(mbcosimd.*)$", unit, re.MULTILINE):
         yield "mbcosimd.service", shlex.split(line.replace("...", "/secrets/any"))[1:], environment_of_unit
 
 

@@ -403,6 +403,8 @@ def test_a_proxy_in_front_is_named_by_its_origin(start_daemon):
     (["--listen", "127.0.0.1:999999"], '--listen: expected unix:PATH or HOST:PORT with a port from 0 to 65535, got "127.0.0.1:999999"'),
     (["--listen", "localhost:"], 'from 0 to 65535, got "localhost:"'),
     (["--listen", "unix:"], 'from 0 to 65535, got "unix:"'),
+    *[(["--listen", f"unix:/tmp/s{between}127.0.0.1:0"], "several addresses in one") for between in (" ", ",", ", ")],
+    (["--listen", "unix:/tmp/s unix:/tmp/t"], "several addresses in one"),
     (["--http-origin", "https://sim.example"], "--http-origin requires --http"),
     (["--http", "[::1]:0"], '--http: HTTP is served at addresses of IPv4 only, got "[::1]:0"'),
     (["--limit-http-connections", "100000"], "--limit-http-connections: expected a number from 1 to 10000"),
