@@ -1,7 +1,7 @@
 /**
  * Places for streams. Over HTTP 1.1 a browser keeps six connections to a server, for all tabs that show it, and a stream has one of them as
- * long as it lives: three tabs would leave none for calls. Browsers without locks between tabs (those of a page from another machine without
- * TLS) have a place for each stream.
+ * long as it lives: three tabs would leave none for calls. Behind a proxy that speaks HTTP 2 there is a place for each stream, and in browsers
+ * without locks between tabs (for a page from another machine without TLS).
  */
 
 /** At once in all tabs: streams of samples and of events, and runs without regard to the wall clock. One connection is left for calls. */
@@ -23,9 +23,14 @@ function lock(name: string): Promise<Place | undefined> {
   });
 }
 
+function isUnlimited(): boolean {
+  const [page] = performance.getEntriesByType('navigation') as PerformanceNavigationTiming[];
+  return !navigator.locks || /^h[23]/.test(page?.nextHopProtocol ?? '');
+}
+
 /** Nothing: all are taken. */
 export async function takePlace(kind: Kind): Promise<Place | undefined> {
-  if (!navigator.locks) return { release: () => {} };
+  if (isUnlimited()) return { release: () => {} };
   for (let k = 0; k < MOST[kind]; ++k) {
     const place = await lock(`mbcosim ${kind} ${k}`);
     if (place) return place;
