@@ -49,7 +49,8 @@ def test_there_are_three_and_they_name_what_they_need(packages):
     needs = field(packages["mbcosim"], "Depends")
     for library in ("libgrpc++1.51", "libprotobuf32", "libklu", "libspdlog1.10"):
         assert library in needs
-    assert "libmbcosim" not in needs
+    assert "libmbcosim" not in needs and "adduser" in needs
+    assert "adduser --system" in run("dpkg-deb", "-I", packages["mbcosim"], "postinst")  # the user of the unit
     assert field(packages["libmbcosim-dev"], "Depends").startswith("mbcosim (= 0.1.0), libeigen3-dev")
     assert field(packages["python3-mbcosim"], "Architecture") == "all" and "python3-grpcio (>= 1.51)" in field(packages["python3-mbcosim"], "Depends")
 
