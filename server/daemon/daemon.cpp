@@ -188,8 +188,6 @@ Daemon::Daemon(const Config& config)
   durability_.start(parts_);
   try {
     listen();
-    if (config_.shared_memory) open_shared_memory();
-    if (!config_.http.empty()) open_http();
     if (config_.resume == "eager") eager_resume_.start(parts_);
   } catch (...) {
     if (server_) shut_down();
@@ -294,10 +292,14 @@ void Daemon::listen() {
   if (!server_) throw std::runtime_error("the server cannot start");
   gate_.open(pollers_->queue());
   watch_backlog();
+  // Nobody is served before all is open that may fail to.
+  if (config_.shared_memory) open_shared_memory();
+  if (!config_.http.empty()) open_http();
   for (std::size_t i = 0; i < listeners_.size(); ++i) {
     listeners_[i]->start(std::move(acceptors[i]));
     spdlog::info("listening on {}", listeners_[i]->bound());
   }
+  if (door_) tell_page();
 }
 
 void Daemon::watch_backlog() {
@@ -337,6 +339,9 @@ void Daemon::open_http() {
       options, http::DoorParts{server_->InProcessChannel(arguments), authenticator_, budgets_,
                                [this] { return metrics_.text(); },
                                [this] { return !draining_.load() && !gate_.closing(); }});
+}
+
+void Daemon::tell_page() const {
   spdlog::info("serving HTTP on {}", door_->address());
   std::printf("page: %s\n", door_->page_address().c_str());  // not logged: it holds a secret
   std::fflush(stdout);

@@ -50,6 +50,7 @@ class Daemon {
   void watch_backlog();
   void open_shared_memory();
   void open_http();
+  void tell_page() const;
   bool end_server();
   void check_listener(const std::string& address) const;
   std::shared_ptr<grpc::ServerCredentials> credentials_for(const std::string& address) const;
