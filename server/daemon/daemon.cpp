@@ -299,6 +299,8 @@ void Daemon::listen() {
     listeners_[i]->start(std::move(acceptors[i]));
     spdlog::info("listening on {}", listeners_[i]->bound());
   }
+  for (const auto& each : shared_memory_)
+    spdlog::info("shared memory for peers through {}", each->path());
   if (door_) tell_page();
 }
 
@@ -321,7 +323,6 @@ void Daemon::open_shared_memory() {
       continue;
     }
     shared_memory_.push_back(std::make_unique<SharedMemoryService>(path, parts_));
-    spdlog::info("shared memory for peers through {}", path);
   }
 }
 

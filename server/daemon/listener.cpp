@@ -83,11 +83,6 @@ ino_t inode_of(int fd) {
   return ::fstatat(fd, "", &info, AT_EMPTY_PATH) == 0 ? info.st_ino : 0;
 }
 
-int port_of(const sockaddr_storage& name) {
-  return ntohs(name.ss_family == AF_INET6 ? reinterpret_cast<const sockaddr_in6&>(name).sin6_port
-                                          : reinterpret_cast<const sockaddr_in&>(name).sin_port);
-}
-
 /// The other side of a TCP connection as gRPC names it, but for the interface of an address that is
 /// only valid on that.
 std::string name_of_peer(int fd) {
@@ -115,7 +110,7 @@ bool has_gone(int fd) {
   return ::poll(&look, 1, 0) > 0 && (look.revents & (POLLRDHUP | POLLHUP | POLLERR)) != 0;
 }
 
-int port_of(int socket) {
+int local_port_of(int socket) {
   sockaddr_storage name{};
   socklen_t size = sizeof name;
   if (::getsockname(socket, reinterpret_cast<sockaddr*>(&name), &size) != 0) return 0;
@@ -160,7 +155,7 @@ Listener::Listener(const std::string& address, ConnectionCounts counts, std::int
   if (host.size() > 2 && host.front() == '[' && host.back() == ']')
     host = host.substr(1, host.size() - 2);
   bind_tcp(host, address.substr(colon + 1));
-  bound_ = address.substr(0, colon + 1) + std::to_string(port_of(sockets_.front().get()));
+  bound_ = address.substr(0, colon + 1) + std::to_string(local_port_of(sockets_.front().get()));
 }
 
 Listener::~Listener() { stop(); }
@@ -193,7 +188,7 @@ void Listener::bind_tcp(const std::string& host, const std::string& port) {
   const std::unique_ptr<addrinfo, decltype(&::freeaddrinfo)> all(found, ::freeaddrinfo);
   int error = EADDRNOTAVAIL;
   for (addrinfo* info = found; info; info = info->ai_next) {
-    if (!sockets_.empty()) set_port(*info, port_of(sockets_.front().get()));
+    if (!sockets_.empty()) set_port(*info, local_port_of(sockets_.front().get()));
     shm::Descriptor socket = listen_on(*info, host == "::");
     if (socket)
       sockets_.push_back(std::move(socket));

@@ -15,6 +15,12 @@ bool is_loopback(const std::string& address) {
   return host == "localhost" || host == "[::1]" || in_loopback_net;
 }
 
+int port_of(const sockaddr_storage& name) {
+  if (name.ss_family == AF_INET) return ntohs(reinterpret_cast<const sockaddr_in&>(name).sin_port);
+  if (name.ss_family != AF_INET6) return -1;
+  return ntohs(reinterpret_cast<const sockaddr_in6&>(name).sin6_port);
+}
+
 void keep_network(in6_addr& address) {
   constexpr std::size_t kNetwork = 8;  // bytes
   if (!IN6_IS_ADDR_V4MAPPED(&address))

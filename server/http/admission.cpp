@@ -49,17 +49,11 @@ std::string this_host() {
 
 constexpr std::string_view kHttp = "http://", kHttps = "https://";
 
-bool begins(std::string_view text, std::string_view with) {
-  return text.substr(0, with.size()) == with;
-}
-
 /// As browsers name it: they leave out the port that goes without saying.
 std::string as_named(const std::string& origin) {
   std::string name = lower(origin);
-  const std::string_view usual = begins(name, kHttps) ? ":443" : ":80";
-  if (name.size() > usual.size() &&
-      name.compare(name.size() - usual.size(), usual.size(), usual) == 0)
-    name.resize(name.size() - usual.size());
+  const std::string_view usual = name.starts_with(kHttps) ? ":443" : ":80";
+  if (name.ends_with(usual)) name.resize(name.size() - usual.size());
   return name;
 }
 
@@ -72,7 +66,7 @@ std::string host_of_origin(const std::string& origin) {
 void check_origins(const std::vector<std::string>& origins) {
   for (const std::string& origin : origins) {
     const std::string name = lower(origin);
-    const bool known = begins(name, kHttp) || begins(name, kHttps);
+    const bool known = name.starts_with(kHttp) || name.starts_with(kHttps);
     const std::string host = known ? host_of_origin(as_named(origin)) : "";
     if (!host.empty() && host.front() != ':' && host.find_first_of("/?#@ ") == std::string::npos)
       continue;

@@ -18,13 +18,6 @@ namespace {
 constexpr std::chrono::milliseconds kRestTime{10000};  // for what is left of a refused request
 constexpr std::size_t kPiece = 1 << 13;  // bytes; civetweb's threads have stacks of 100 KiB
 
-// civetweb does not tell the socket of a connection: it is the one with this peer at the door's
-// port. One peer may have connections to other ports of the daemon, too.
-int find_socket(const mg_request_info& info) {
-  const Endpoint wanted{info.remote_addr, info.remote_port};
-  return http::find_socket(info.server_port, [&](int fd) { return peer_of(fd) == wanted; });
-}
-
 // civetweb would write the date by gmtime, whose result all threads share.
 std::string date_now() {
   const std::time_t now = std::time(nullptr);
@@ -89,11 +82,14 @@ bool is_one_of(std::string_view word, std::string_view list) {
   return false;
 }
 
+// civetweb does not tell the socket of a connection: it is the one with this peer at the door's
+// port. One peer may have connections to other ports of the daemon, too.
 int socket_of(mg_connection* raw, const mg_request_info& info) {
   auto* peer = static_cast<Peer*>(mg_get_user_connection_data(raw));
   if (!peer) {
     peer = new Peer;  // deleted by the door when the connection closes
-    peer->socket = find_socket(info);
+    const Endpoint wanted{info.remote_addr, info.remote_port};
+    peer->socket = find_socket(info.server_port, [&](int fd) { return peer_of(fd) == wanted; });
     mg_set_user_connection_data(raw, peer);
   }
   return peer->socket;
@@ -173,42 +169,31 @@ std::string_view Connection::cookie(std::string_view name) const {
   return {};
 }
 
-/// The client does not read what it asked for: others need not wait for that.
-class Connection::Standing {
+/// For what the client may never send, or read: others need not wait for that.
+class Connection::Waiting {
  public:
-  explicit Standing(Connection& connection) : of_(connection) { of_.crowd_.stands(of_.socket_); }
-  ~Standing() { of_.crowd_.goes_on(of_.socket_); }
-  Standing(const Standing&) = delete;
-  Standing& operator=(const Standing&) = delete;
+  explicit Waiting(Connection& connection) : of_(connection) { of_.crowd_.waits(of_.socket_); }
+  ~Waiting() { of_.crowd_.goes_on(of_.socket_); }
+  Waiting(const Waiting&) = delete;
+  Waiting& operator=(const Waiting&) = delete;
 
- private:
-  Connection& of_;
-};
-
-/// What the client may never send is read: others need not wait for that.
-class Connection::Reading {
- public:
-  explicit Reading(Connection& connection) : of_(connection) { of_.crowd_.ended(of_.socket_); }
-  ~Reading() { of_.crowd_.began(of_.socket_); }
-  Reading(const Reading&) = delete;
-  Reading& operator=(const Reading&) = delete;
-
+  /// So many bytes have come, or gone; none where it is negative.
+  void moved(std::int64_t bytes) {
+    if (bytes <= 0 || (since_ += bytes) < Crowd::kProgress) return;
+    since_ = 0;
+    of_.crowd_.moves(of_.socket_);
+  }
   /// Bytes, 0 at the end, negative when the connection is lost.
   int read(std::array<char, kPiece>& piece) {
     const int count = mg_read(of_.raw_, piece.data(), piece.size());
-    if (count > 0) of_.note_moved(static_cast<std::size_t>(count));
+    moved(count);
     return count;
   }
 
  private:
   Connection& of_;
+  std::int64_t since_ = 0;  ///< bytes
 };
-
-void Connection::note_moved(std::size_t bytes) {
-  if ((moved_ += bytes) < Crowd::kProgress) return;
-  moved_ = 0;
-  crowd_.moves(socket_);
-}
 
 Connection::Body Connection::read_body(std::size_t limit, std::string* body) {
   body->clear();
@@ -216,8 +201,8 @@ Connection::Body Connection::read_body(std::size_t limit, std::string* body) {
   reaper_.arm(socket_, kTransferTime);
   if (waits_for_leave() && !write("HTTP/1.1 100 Continue\r\n\r\n")) return Body::broken;
   std::array<char, kPiece> piece;
-  for (Reading reading(*this);;) {
-    const int count = reading.read(piece);
+  for (Waiting waiting(*this);;) {
+    const int count = waiting.read(piece);
     if (count < 0) return Body::broken;
     if (count == 0) break;
     if (body->size() + static_cast<std::size_t>(count) > limit) return Body::too_long;
@@ -269,8 +254,8 @@ void Connection::respond(int status, std::string_view content_type, std::string_
 void Connection::drop_rest() {
   reaper_.arm(socket_, kRestTime);
   std::array<char, kPiece> piece;
-  Reading reading(*this);
-  while (reading.read(piece) > 0) continue;
+  Waiting waiting(*this);
+  while (waiting.read(piece) > 0) continue;
 }
 
 bool Connection::start_stream(std::string_view content_type, const Headers& headers) {
@@ -314,16 +299,16 @@ bool Connection::send_all(std::string_view bytes) {
 bool Connection::write(std::string_view bytes) {
   if (socket_ < 0)
     return mg_write(raw_, bytes.data(), bytes.size()) == static_cast<int>(bytes.size());
-  std::optional<Standing> standing;
+  std::optional<Waiting> waiting;
   while (!bytes.empty()) {
     const ssize_t count = ::send(socket_, bytes.data(), bytes.size(), MSG_NOSIGNAL | MSG_DONTWAIT);
     if (count >= 0) {
       bytes.remove_prefix(static_cast<std::size_t>(count));
-      if (standing) note_moved(static_cast<std::size_t>(count));
+      if (waiting) waiting->moved(count);
       continue;
     }
     if (errno != EAGAIN && errno != EINTR) return false;
-    if (!standing) standing.emplace(*this);
+    if (!waiting) waiting.emplace(*this);
     pollfd state{socket_, POLLOUT, 0};
     if (::poll(&state, 1, kTransferTime.count()) == 0) return false;
   }

@@ -31,7 +31,7 @@ struct Peer {
   void look_for_request();
 };
 
-/// Time that a client has to send the head of a request, or its body, or to read an answer.
+/// Time that a client has to send a request's body, or to read an answer.
 inline constexpr std::chrono::milliseconds kTransferTime{30000};
 
 class Connection {
@@ -69,9 +69,7 @@ class Connection {
   void drop_rest();
   bool send_all(std::string_view bytes);
   bool write(std::string_view bytes);
-  void note_moved(std::size_t bytes);
-  class Standing;
-  class Reading;
+  class Waiting;
 
   mg_connection* raw_;
   const mg_request_info* info_;
@@ -80,7 +78,6 @@ class Connection {
   int socket_ = -1;
   int status_ = 500;
   bool body_read_ = false;
-  std::size_t moved_ = 0;  ///< bytes, since the crowd was told
 };
 
 /// What is wrong with the head of a request; null: nothing. What leaves open where its body ends, a

@@ -13,7 +13,8 @@
 namespace mbcosim::server::http {
 namespace {
 
-constexpr std::chrono::milliseconds kLook{100};
+constexpr std::chrono::milliseconds kLook{100};  // while others wait
+constexpr std::chrono::seconds kHeadLook{1};
 constexpr std::chrono::milliseconds kPatience{250};  // with who holds a worker that others wait for
 
 // What tells a socket from others with the same number; 0: the kernel does not say.
@@ -58,7 +59,7 @@ void Crowd::listens_at(const Endpoint& local) {
 
 void Crowd::came() {
   const Guard lock(mutex_);
-  if (++held_ == workers_) changed_.notify_one();
+  if (++held_ == workers_ || rests_) changed_.notify_one();
 }
 
 void Crowd::went() {
@@ -69,23 +70,23 @@ void Crowd::went() {
 void Crowd::began(int socket) {
   const Guard lock(mutex_);
   in_request_.insert(socket);
-  moved_.erase(socket);
+  moved_[socket] = Clock::now();
 }
 
 void Crowd::ended(int socket) {
   const Guard lock(mutex_);
   in_request_.erase(in_request_.find(socket));
+  if (rests_) changed_.notify_one();
 }
 
-void Crowd::stands(int socket) {
+void Crowd::waits(int socket) {
   const Guard lock(mutex_);
-  standing_.insert(socket);
-  moved_.erase(socket);
+  waiting_.insert(socket);
 }
 
 void Crowd::goes_on(int socket) {
   const Guard lock(mutex_);
-  standing_.erase(socket);
+  waiting_.erase(waiting_.find(socket));
 }
 
 void Crowd::moves(int socket) {
@@ -111,42 +112,52 @@ void Crowd::thin_out() {
     int socket;
     std::uint64_t cookie;
     Clock::time_point since;
+    bool asked;
   };
   std::size_t connections = 0;
   std::vector<Idle> found;
+  std::map<std::uint64_t, Clock::time_point> idle;
   const Clock::time_point now = Clock::now();
   find_socket(local_.port, [&](int fd) TS_REQUIRES(mutex_) {
     if (peer_of(fd).port < 0 || !is_ours(fd)) return false;
     ++connections;
     const std::uint64_t cookie = cookie_of(fd);
-    const bool asks = in_request_.count(fd) != 0 || has_bytes(fd);
-    if (cookie == 0 || (asks && standing_.count(fd) == 0)) return false;
-    const auto moved = moved_.find(fd);
-    if (moved != moved_.end() && now - moved->second < kPatience) return false;
+    const bool asked = in_request_.count(fd) != 0;
+    if (cookie == 0 || (waiting_.count(fd) == 0 && (asked || has_bytes(fd)))) return false;
     const auto before = idle_.find(cookie);
-    found.push_back({fd, cookie, before == idle_.end() ? now : before->second});
+    idle[cookie] = before == idle_.end() ? now : before->second;
+    const auto moved = moved_.find(fd);
+    const auto last = moved == moved_.end() ? idle[cookie] : moved->second;
+    found.push_back({fd, cookie, std::max(idle[cookie], last), asked});
     return false;
   });
-  idle_.clear();
-  for (const Idle& idle : found) idle_[idle.cookie] = idle.since;
+  idle_ = std::move(idle);
   std::stable_sort(found.begin(), found.end(),
                    [](const Idle& a, const Idle& b) { return a.since < b.since; });
-  const std::size_t waiting = connections - std::min(connections, workers_);
-  found.resize(std::min(found.size(), waiting));
-  for (const Idle& idle : found)
-    if (now - idle.since >= kPatience) shut_down(idle.socket, idle.cookie);
+  std::size_t wait_for_worker = connections - std::min(connections, workers_);
+  for (const Idle& each : found) {
+    const bool is_in_the_way = wait_for_worker > 0 && now - each.since >= kPatience;
+    wait_for_worker -= is_in_the_way;
+    if (is_in_the_way || (!each.asked && now - each.since >= kHeadTime))
+      shut_down(each.socket, each.cookie);
+  }
 }
 
 void Crowd::loop() {
   const Guard lock(mutex_);
   while (!stop_) {
-    if (held_ < workers_) {
+    const bool full = held_ >= workers_;
+    rests_ = !full && held_ <= in_request_.size();
+    if (rests_) {
       idle_.clear();
       changed_.wait(mutex_);
       continue;
     }
     if (local_.port >= 0 && in_request_.count(-1) == 0) thin_out();
-    changed_.wait_for(mutex_, kLook);
+    if (full)
+      changed_.wait_for(mutex_, kLook);
+    else
+      changed_.wait_for(mutex_, kHeadLook);
   }
 }
 

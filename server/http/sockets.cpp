@@ -12,22 +12,21 @@
 #include <fstream>
 #include <string_view>
 
+#include "host/addresses.h"
+
 namespace mbcosim::server::http {
 namespace {
 
 using GetName = int (*)(int, sockaddr*, socklen_t*);
 
-/// −1: it is no IP socket.
-int port_of(const sockaddr_storage& name) {
-  if (name.ss_family == AF_INET) return ntohs(reinterpret_cast<const sockaddr_in&>(name).sin_port);
-  if (name.ss_family != AF_INET6) return -1;
-  return ntohs(reinterpret_cast<const sockaddr_in6&>(name).sin6_port);
+/// Without a family: it has none.
+sockaddr_storage name_of(GetName get, int socket) {
+  sockaddr_storage name{};
+  socklen_t size = sizeof name;
+  return get(socket, reinterpret_cast<sockaddr*>(&name), &size) == 0 ? name : sockaddr_storage{};
 }
 
-Endpoint endpoint(GetName get, int socket) {
-  sockaddr_storage name{};
-  socklen_t length = sizeof name;
-  if (get(socket, reinterpret_cast<sockaddr*>(&name), &length) != 0) return {};
+Endpoint endpoint(const sockaddr_storage& name) {
   std::array<char, INET6_ADDRSTRLEN> text{};
   if (name.ss_family == AF_INET) {
     const auto& v4 = reinterpret_cast<const sockaddr_in&>(name);
@@ -53,24 +52,13 @@ int end_of_descriptors() {
 
 }  // namespace
 
-Endpoint peer_of(int socket) {
-  return endpoint(
-      [](int s, sockaddr* name, socklen_t* size) { return ::getpeername(s, name, size); }, socket);
-}
-
-Endpoint local_of(int socket) {
-  return endpoint(
-      [](int s, sockaddr* name, socklen_t* size) { return ::getsockname(s, name, size); }, socket);
-}
+Endpoint peer_of(int socket) { return endpoint(name_of(::getpeername, socket)); }
+Endpoint local_of(int socket) { return endpoint(name_of(::getsockname, socket)); }
 
 int find_socket(int port, const std::function<bool(int)>& look) {
   const int end = port < 0 ? 0 : end_of_descriptors();
-  for (int fd = 0; fd < end; ++fd) {
-    sockaddr_storage name{};
-    socklen_t size = sizeof name;
-    const bool named = ::getsockname(fd, reinterpret_cast<sockaddr*>(&name), &size) == 0;
-    if (named && port_of(name) == port && look(fd)) return fd;
-  }
+  for (int fd = 0; fd < end; ++fd)
+    if (port_of(name_of(::getsockname, fd)) == port && look(fd)) return fd;
   return -1;
 }
 

@@ -41,8 +41,7 @@ class AddressCheck {
   /// Behind a blank or a comma, of which a path may have some, too.
   static bool names_several(std::string_view text) {
     const std::string_view last = text.substr(text.find_last_of(" ,") + 1);
-    return last.size() < text.size() &&
-           (last.substr(0, kUnix.size()) == kUnix || is_host_and_port(last));
+    return last.size() < text.size() && (last.starts_with(kUnix) || is_host_and_port(last));
   }
   static constexpr std::string_view kUnix = "unix:";
 

@@ -25,6 +25,7 @@ class SharedMemoryService {
   ~SharedMemoryService();
   SharedMemoryService(const SharedMemoryService&) = delete;
   SharedMemoryService& operator=(const SharedMemoryService&) = delete;
+  const std::string& path() const { return path_; }
 
  private:
   struct Connection {

@@ -518,7 +518,7 @@ def test_slow_senders_disturb_nobody_and_are_cut_off(door, server, pendulum):
         except OSError:
             return True
 
-    wait_for(lambda: all(cut_off(link) for link in slow), 60)
+    wait_for(lambda: all(cut_off(link) for link in slow), 20)
     for link in slow:
         link.close()
 

@@ -1,9 +1,10 @@
 import { describe, expect, test, vi } from 'vitest';
+import { StepOutcome } from '../src/gen/mbcosim/v1/simulations_pb';
 import { Session } from '../src/session';
 
 /** Streams of samples and of events that were begun; places that are held. */
 const begun: AbortSignal[] = [];
-let held = 0, given = 0, refused = false, close = () => {};
+let held = 0, given = 0, refused = false, othersRun = 0, close = () => {};
 
 async function* stream(_: object, { signal }: { signal: AbortSignal }): AsyncGenerator<never> {
   begun.push(signal);
@@ -11,9 +12,13 @@ async function* stream(_: object, { signal }: { signal: AbortSignal }): AsyncGen
   await new Promise((_, reject) => signal.addEventListener('abort', reject));
 }
 
+async function* reachTheEnd() {
+  yield { content: { case: 'done', value: { outcome: StepOutcome.FINISHED, stepsDone: 0n, step: 7n, time: 1 } } };
+}
+
 vi.mock('../src/api', () => ({
   failureOf: () => ({ message: '', reason: '', metadata: {}, diagnostics: [], cancelled: true }),
-  simulations: { readVariables: async () => ({ step: 0n, time: 0, values: [] }), listSnapshots: async () => ({ snapshots: [] }) },
+  simulations: { run: reachTheEnd, readVariables: async () => ({ step: 0n, time: 0, values: [] }), listSnapshots: async () => ({ snapshots: [] }) },
   telemetry: { subscribe: stream },
   events: { watchEvents: stream },
 }));
@@ -24,7 +29,8 @@ vi.mock('../src/questions', () => ({
 vi.mock('../src/model', () => ({ modelOf: () => ({ title: '', variables: [] }) }));
 vi.mock('../src/load_geometry', () => ({ loadGeometry: async () => ({ geometry: { nodes: [], elements: [], bodies: [] }, cards: new Map() }) }));
 vi.mock('../src/places', () => ({
-  pause: () => new Promise(() => {}),
+  pause: (milliseconds: number) => new Promise<void>((later) => milliseconds < 400 && setTimeout(later)),  // what is done again later never is
+  takePlace: async () => (othersRun-- > 0 ? undefined : { release: () => --held, held: ++held }),
   placeToFollow: async (_: string, wanted: () => boolean) => {
     await new Promise((later) => setTimeout(later));
     if (!wanted()) return undefined;
@@ -58,5 +64,26 @@ describe('a simulation on the screen', () => {
     const session = await Session.open('simulations/1');
     await vi.waitFor(() => expect([held, begun.length]).toEqual([0, 2]));
     session.close();
+  });
+
+  test('runs when those in other tabs have ended, and says so meanwhile', async () => {
+    refused = false;
+    othersRun = 3;
+    const session = await Session.open('simulations/1');
+    await session.runUntil(1);
+    expect(session.log.value.map(({ text }) => text)).toEqual(['waits until a run in another tab ends']);
+    expect([session.playing.value, Number(session.info.value.step), othersRun]).toEqual(['no', 7, -1]);
+    session.close();
+    await vi.waitFor(() => expect(held).toBe(0));
+  });
+
+  test('that is closed while its run waits for others does not run', async () => {
+    othersRun = Infinity;
+    const session = await Session.open('simulations/1'), run = session.runUntil(1);
+    await vi.waitFor(() => expect(session.log.value).toHaveLength(1));
+    session.close();
+    await run;
+    expect(Number(session.info.value.step)).toBe(0);
+    await vi.waitFor(() => expect(held).toBe(0));
   });
 });
