@@ -78,7 +78,7 @@ def test_a_clone_without_protoc_names_the_packages(tmp_path):
     done = subprocess.run([sys.executable, "-c", f"import build_backend; build_backend.build_wheel({str(tmp_path)!r})"], cwd=SOURCE,
                           env={**PLAIN, "PATH": str(tmp_path), "PYTHONDONTWRITEBYTECODE": "1"}, stderr=subprocess.PIPE, text=True, check=False)
     assert done.returncode != 0
-    assert "apt-get install protobuf-compiler protobuf-compiler-grpc    or    pip install grpcio-tools" in done.stderr
+    assert "apt-get install protobuf-compiler protobuf-compiler-grpc libprotobuf-dev    or    pip install grpcio-tools\n" in done.stderr
 
 
 def test_the_version_is_that_of_the_project():

@@ -134,7 +134,7 @@ def test_leases_that_no_server_gives_are_refused(start, seconds, reason):
 def test_exports_that_nobody_reads_leave_descriptors_to_others(start):
     daemon = start()
     with daemon.connect() as server, grpc.insecure_channel(daemon.address, [("grpc.http2.lookahead_bytes", 5), ("grpc.http2.bdp_probe", 0)]) as channel:
-        simulation = server.load_text(deck() + "# " + 1_000_000 * "x")
+        simulation = server.load_text(deck() + "# " + 4_000_000 * "x")  # several messages each
         export = simulations_pb2_grpc.SimulationsStub(channel).ExportCheckpoint
         begun = [export(pb.ExportCheckpointRequest(simulation=simulation.name)) for _ in range(8)]
         for stream in begun:
