@@ -66,8 +66,8 @@ void check_address(const std::string& address) {
 std::string why_nobody(const std::string& address) {
   if (!begins(address, kUnix)) return "";
   struct stat info {};
-  if (::stat(address.c_str() + kUnix.size(), &info) != 0) return ": there is no such socket";
-  return S_ISSOCK(info.st_mode) ? ": nobody accepts connections there" : ": that is no socket";
+  if (::stat(address.c_str() + kUnix.size(), &info) != 0) return "there is no such socket";
+  return S_ISSOCK(info.st_mode) ? "nobody accepts connections there" : "that is no socket";
 }
 
 }  // namespace mbcosim::client

@@ -9,7 +9,7 @@ namespace mbcosim::client {
 /// BAD_ARGUMENT and what is wrong, when it can be none.
 void check_address(const std::string& address);
 
-/// Why no server answers at a socket: ": there is no such socket". Empty where that cannot be told.
+/// Why no server answers at a socket: "there is no such socket". Empty where that cannot be told.
 std::string why_nobody(const std::string& address);
 
 }  // namespace mbcosim::client

@@ -22,9 +22,8 @@ constexpr std::size_t kChunkBytes = 1 << 20;
 std::shared_ptr<grpc::ChannelCredentials> channel_credentials(const Credentials& credentials) {
   if (credentials.certificate.empty() != credentials.key.empty())
     refuse("a certificate and its key belong together", "certificate");
-  if (credentials.server_ca.empty() && !credentials.certificate.empty())
-    refuse("a certificate is shown over TLS: name the authority of the server's, too", "server_ca");
-  if (credentials.server_ca.empty()) return grpc::InsecureChannelCredentials();
+  if (!credentials.tls && credentials.server_ca.empty() && credentials.certificate.empty())
+    return grpc::InsecureChannelCredentials();
   return grpc::SslCredentials({credentials.server_ca, credentials.key, credentials.certificate});
 }
 
@@ -110,6 +109,18 @@ Server::Server(Server&&) noexcept = default;
 Server& Server::operator=(Server&&) noexcept = default;
 Server::~Server() = default;
 
+namespace {
+
+/// What kept gRPC from a connection: nobody listens, a certificate that is not trusted.
+std::string last_cause(const Server::Impl& server) {
+  constexpr double kAtOnce = 1;  // [s]; that it failed is known
+  CallContext context(server, kAtOnce);
+  v1::GetServerInfoReply reply;
+  return server.simulations->GetServerInfo(&context, {}, &reply).error_message();
+}
+
+}  // namespace
+
 Server Server::connect(const std::string& address, double timeout, const Credentials& credentials,
                        double reconnect) {
   if (!(reconnect >= 0 && reconnect <= 1e9))
@@ -132,9 +143,12 @@ Server Server::connect(const std::string& address, double timeout, const Credent
   const auto deadline =
       std::chrono::system_clock::now() +
       std::chrono::milliseconds(static_cast<std::int64_t>(checked_timeout(timeout) * 1000));
-  if (!impl->channel->WaitForConnected(deadline))
-    throw Error("no server answers at " + address + why_nobody(address),
-                static_cast<int>(grpc::StatusCode::UNAVAILABLE), "", {});
+  if (!impl->channel->WaitForConnected(deadline)) {
+    const std::string cause = why_nobody(address);
+    throw Error(
+        "no server answers at " + address + ": " + (cause.empty() ? last_cause(*impl) : cause),
+        static_cast<int>(grpc::StatusCode::UNAVAILABLE), "", {});
+  }
   return Server(std::move(impl));
 }
 

@@ -573,7 +573,8 @@ class Simulation {
 /// Who the client is, and how it knows the server. Texts of PEM files, not their names.
 struct Credentials {
   std::string token = {};      ///< bearer token
-  std::string server_ca = {};  ///< authority of the server's certificate: the connection uses TLS
+  bool tls = false;            ///< TLS; the connection uses it with one of the next, too
+  std::string server_ca = {};  ///< of the server's certificate; empty: who this machine trusts
   std::string certificate = {}, key = {};  ///< of the client, for servers that want one
 };
 

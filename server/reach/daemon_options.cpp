@@ -38,6 +38,7 @@ void add_daemon_options(CLI::App& command, DaemonOptions& options) {
   // other's command line.
   options.address = from_environment("MBCOSIM_ADDRESS", default_socket());
   options.token = from_environment("MBCOSIM_TOKEN", "");
+  options.tls = from_environment("MBCOSIM_TLS", "0") != "0";
   options.ca = from_environment("MBCOSIM_TLS_CA", "");
   options.certificate = from_environment("MBCOSIM_TLS_CERTIFICATE", "");
   options.key = from_environment("MBCOSIM_TLS_KEY", "");
@@ -51,9 +52,13 @@ void add_daemon_options(CLI::App& command, DaemonOptions& options) {
                      "MBCOSIM_TOKEN_FILE holds");
   command.add_option("--token-file", options.token_file,
                      "File with the bearer token; goes before the token itself");
+  command.add_flag(
+      "--tls", options.tls,
+      "The connection uses TLS, as with one of the next; default: where MBCOSIM_TLS of "
+      "the environment is 1");
   command.add_option("--ca", options.ca,
-                     "PEM file: authority of the daemon's certificate; the connection uses TLS; "
-                     "default: MBCOSIM_TLS_CA of the environment");
+                     "PEM file: authority of the daemon's certificate; default: MBCOSIM_TLS_CA of "
+                     "the environment, or those that this machine trusts");
   command.add_option("--certificate", options.certificate,
                      "PEM file of this client; default: MBCOSIM_TLS_CERTIFICATE");
   command.add_option("--key", options.key, "PEM file of its key; default: MBCOSIM_TLS_KEY");
@@ -65,6 +70,7 @@ void add_daemon_options(CLI::App& command, DaemonOptions& options) {
 client::Server reach(const DaemonOptions& options) {
   check_default_socket(options.address);
   const client::Credentials credentials{.token = token_of(options),
+                                        .tls = options.tls,
                                         .server_ca = text_of_file(options.ca),
                                         .certificate = text_of_file(options.certificate),
                                         .key = text_of_file(options.key)};

@@ -14,6 +14,7 @@ namespace mbcosim::server {
 struct DaemonOptions {
   std::string address;
   std::string token, token_file;
+  bool tls = false;
   std::string ca, certificate, key;  ///< PEM files
   double timeout = 10;               ///< [s], to reach the daemon
 };

@@ -344,8 +344,9 @@ def test_commands_say_what_is_wrong(start, tmp_path):
         code, _, errors = run(*arguments, "--address", daemon.address)
         assert code == 4 and text in errors, errors
         assert not os.path.exists(missing)
-    code, _, errors = run("sessions", "--address", f"unix:{missing}", "--timeout", "0.3")
-    assert code == 4 and missing in errors
+    for address, why in [(f"unix:{missing}", "there is no such socket"), ("localhost:1", "Connection refused")]:
+        code, _, errors = run("sessions", "--address", address, "--timeout", "0.3")
+        assert code == 4 and f"no server answers at {address}: " in errors and why in errors, errors
 
 
 @pytest.mark.parametrize("make", [os.mkfifo, os.mkdir, lambda path: os.symlink("/dev/zero", path)], ids=["pipe", "folder", "device"])

@@ -95,15 +95,20 @@ def shown(address, ca):
         return None
 
 
-@pytest.fixture
-def secured(start_daemon, tmp_path):
-    """A daemon with TLS, and its address."""
+def daemon_with_tls(start_daemon, tmp_path, *options):
+    """A daemon, and its address."""
     certificate(tmp_path, "ca", "/CN=authority")
     certificate(tmp_path, "server", "/CN=localhost", "ca", ["-addext", "subjectAltName=DNS:localhost"])
     daemon = start_daemon("--listen", "localhost:0", "--tls-certificate", str(tmp_path / "server.pem"), "--tls-key",
-                          str(tmp_path / "server.key"), "--tls-client-ca", str(tmp_path / "ca.pem"))
+                          str(tmp_path / "server.key"), *options)
     wait_for(lambda: "listening on localhost:" in daemon.log())
     return daemon, "localhost:" + daemon.log().split("listening on localhost:")[1].split()[0]
+
+
+@pytest.fixture
+def secured(start_daemon, tmp_path):
+    """A daemon that asks for certificates, and its address."""
+    return daemon_with_tls(start_daemon, tmp_path, "--tls-client-ca", str(tmp_path / "ca.pem"))
 
 
 def test_a_new_certificate_is_shown_without_a_restart(secured, tmp_path):
@@ -173,8 +178,8 @@ def test_the_commands_reach_a_daemon_over_tls(secured, tmp_path):
     certificate(tmp_path, "client", "/CN=arm", "ca")
     files = {"--ca": "ca.pem", "--certificate": "client.pem", "--key": "client.key"}
 
-    def sessions(files, **environment):
-        arguments = [word for option, file in files.items() for word in (option, str(tmp_path / file))]
+    def sessions(files, *options, **environment):
+        arguments = [*options, *(word for option, file in files.items() for word in (option, str(tmp_path / file)))]
         return subprocess.run([os.path.join(os.path.dirname(DAEMON), "mbcosim"), "sessions", "--address", address, *arguments],
                               env={**os.environ, **environment}, capture_output=True, text=True, timeout=30 * TIME_FACTOR)
 
@@ -184,9 +189,27 @@ def test_the_commands_reach_a_daemon_over_tls(secured, tmp_path):
         assert done.returncode == 0 and done.stdout.startswith("simulation"), done
     for missing in (sessions({**files, "--ca": "none.pem"}), sessions({}, **{**variables, "MBCOSIM_TLS_CA": "none.pem"})):
         assert missing.returncode == 4 and "none.pem" in missing.stderr and missing.stdout == ""
-    for lacking, told in (("--ca", "name the authority of the server's"), ("--key", "belong together")):
-        refused = sessions({option: file for option, file in files.items() if option != lacking})
-        assert refused.returncode == 4 and told in refused.stderr, refused
+    without_key = sessions({"--ca": "ca.pem", "--certificate": "client.pem"})
+    assert without_key.returncode == 4 and "belong together" in without_key.stderr, without_key
+    # Without an authority it is TLS all the same, and those count that this machine trusts.
+    own = {"--certificate": "client.pem", "--key": "client.key"}
+    untrusted = sessions(own, "--timeout", "1")
+    assert untrusted.returncode == 4 and "no server answers at " + address in untrusted.stderr and "certificate verify failed" in untrusted.stderr.rpartition("no server")[2].lower(), untrusted
+    assert sessions(own, GRPC_DEFAULT_SSL_ROOTS_FILE_PATH=str(tmp_path / "ca.pem")).returncode == 0
+
+
+def test_the_commands_trust_who_this_machine_trusts(start_daemon, tmp_path):
+    _, address = daemon_with_tls(start_daemon, tmp_path, "--insecure")
+
+    def sessions(*options, **environment):
+        return subprocess.run([os.path.join(os.path.dirname(DAEMON), "mbcosim"), "sessions", "--address", address, "--timeout", "2", *options],
+                              env={**os.environ, "GRPC_DEFAULT_SSL_ROOTS_FILE_PATH": str(tmp_path / "ca.pem"), **environment},
+                              capture_output=True, text=True, timeout=30 * TIME_FACTOR)
+
+    for done in (sessions("--tls"), sessions(MBCOSIM_TLS="1")):
+        assert done.returncode == 0 and done.stdout.startswith("simulation"), done
+    for plain in (sessions(), sessions(MBCOSIM_TLS="0"), sessions(MBCOSIM_TLS="")):
+        assert plain.returncode == 4, plain
 
 
 def test_health_is_asked_over_tls(secured, tmp_path):
