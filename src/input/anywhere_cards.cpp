@@ -139,14 +139,15 @@ void read_drive_caller(DeckCard& card) {
   d.name = card.optional_name();
   card.keyword("deferred");
   d.drive = card.drive();
-  if (!read_drive_output(card, d))
-    deck.drives_without_output.push_back(static_cast<int>(card.model().drives.size()));
+  const bool output_is_told = read_drive_output(card, d);
   drop_missing_derivative(card, *d.drive, d.output_derivative);
   read_drive_trace(card, d);
   card.expect_end();
   d.evaluations = card.weight().objects;
   deck.drives[d.label] = {d.drive, card.head(), card.weight()};
-  card.model().drive_index[d.label] = static_cast<int>(card.model().drives.size());
+  const int index = static_cast<int>(card.model().drives.size());
+  card.model().drive_index[d.label] = index;
+  if (!output_is_told) deck.drives_without_output.push_back(index);
   card.model().drives.push_back(std::move(d));
 }
 

@@ -215,6 +215,13 @@ TEST(MalformedDeck, HasOneErrorForAMisspelledBlock) {
   EXPECT_EQ(findings(load(text).diagnostics), "error: unknown block \"nods\"");
 }
 
+/// A card that is refused after what it says of its output has made no drive.
+TEST(MalformedDeck, HasNoDriveOfARefusedCardToWrite) {
+  DeckText deck = elements("drive caller: 1, time, 5.; drive caller: 2, time;");
+  deck.control += "default output: drive callers;";
+  EXPECT_EQ(findings(load(deck).diagnostics), "error: drive caller 1: unexpected argument \"5.\"");
+}
+
 TEST(MalformedDeck, RefusesMoreThanTheOutputOfADrive) {
   EXPECT_EQ(
       load(elements("drive caller: 1, const, 1., output, yes, 77.;")).diagnostics.at(0).message,
