@@ -189,10 +189,12 @@ Status picture(const std::vector<Curve>& curves, const std::string& x_name,
                           "\"; make it with `mkdir -p`");
   std::error_code none;
   std::filesystem::remove(path, none);
-  if (feed({"gnuplot"}, gnuplot_script(curves, x_name, title, path)) != 0 ||
-      !std::filesystem::exists(path))
-    feed({"python3", "-"}, python_script(curves, x_name, title, path));
-  if (std::filesystem::exists(path)) return ok();
+  const auto drawn_by = [&](const std::vector<std::string>& program, const std::string& script) {
+    return feed(program, script) == 0 && std::filesystem::exists(path);
+  };
+  if (drawn_by({"gnuplot"}, gnuplot_script(curves, x_name, title, path)) ||
+      drawn_by({"python3", "-"}, python_script(curves, x_name, title, path)))
+    return ok();
   return make_error(
       ErrorKind::io, "",
       "cannot draw \"" + path +

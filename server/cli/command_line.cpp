@@ -117,7 +117,8 @@ void add_plot(CLI::App& app, mbcosim::cli::PlotCommand& command, int& exit_code)
       app.add_subcommand("plot", "Draw results over time: on the terminal, or into a picture");
   plot->add_option("prefix", command.prefix, "Prefix of the result files of a run")->required();
   add_curve(*plot, "--node", "mov", command.curves,
-            "Of a node: x y z, e1 e2 e3 (Euler angles), vx.., wx.., ax.., the vectors X E V W, or "
+            "Of a node: x y z, e1 e2 e3 (Euler angles [deg], or the rotation vector [rad]), vx.., "
+            "wx.., ax.., the vectors X E V W, or "
             "the number of a column of .mov after the label");
   add_curve(*plot, "--joint", "jnt", command.curves,
             "Of a joint: fx fy fz mx my mz in its frame, Fx .. Mz in the global one, the vectors "
@@ -267,8 +268,8 @@ int mbcosim::cli::command_line(int argc, char** argv) {
       app.add_subcommand("run", "Run a deck to its final time and write the results");
   run_app->add_option("deck", run_options.deck, "Main file of the deck")->required();
   run_app->add_option("-o,--output", run_options.prefix,
-                      "Prefix of the result files (PREFIX.mov, PREFIX.jnt, ...); "
-                      "default: the deck's name");
+                      "Prefix of the result files (PREFIX.mov, PREFIX.jnt, ...), or a folder for "
+                      "files of the deck's name; default: the deck's name without ending");
   run_app
       ->add_option("--format", run_options.formats,
                    "Format of the results, text or netcdf, whatever the deck asks for; may be "

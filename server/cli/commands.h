@@ -27,7 +27,8 @@ constexpr int kMostThreads = 1024;
 struct RunOptions {
   std::string deck;  ///< path of the main file
   SymbolValues symbols;
-  std::string prefix;                ///< of the result files; empty: the deck's path
+  std::string
+      prefix;  ///< of the result files, or their folder; empty: the deck's path without ending
   std::vector<std::string> formats;  ///< "text", "netcdf"; empty: what the deck asks for
   bool quiet = false;
   bool deck_sockets = true;  ///< the sockets and files that the deck names are served

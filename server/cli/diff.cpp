@@ -21,18 +21,21 @@ struct Worst {
   }
 };
 
-double distance(double a, double b) {
+/// `period`: of angles, of which 180 and -180 are the same; infinite: of no angle.
+double distance(double a, double b, double period) {
   if (std::isnan(a) && std::isnan(b)) return 0;
-  return std::isnan(a) || std::isnan(b) ? HUGE_VAL : std::abs(a - b);
+  if (std::isnan(a) || std::isnan(b)) return HUGE_VAL;
+  const double straight = a == b ? 0 : std::abs(a - b);  // equal infinities, too
+  return straight > 0.5 * period ? std::abs(std::remainder(a - b, period)) : straight;
 }
 
 using Rows = std::vector<std::vector<double>>;
 
-Worst compare_column(const Rows& a, const Rows& b, std::size_t column) {
+Worst compare_column(const Rows& a, const Rows& b, std::size_t column, double period) {
   Worst worst;
   for (std::size_t k = 0; k < a.size(); ++k) {
     worst.scale = std::max(worst.scale, std::abs(a[k][column]));
-    const double d = distance(a[k][column], b[k][column]);
+    const double d = distance(a[k][column], b[k][column], period);
     if (d > worst.difference) worst.difference = d, worst.record = k;
   }
   return worst;
@@ -46,7 +49,8 @@ bool same_shape(const Rows& a, const Rows& b) {
 
 class Comparison {
  public:
-  Comparison(const DiffCommand& command) : command_(command) {}
+  Comparison(const DiffCommand& command)
+      : command_(command), orientations_(read_orientations(command.first)) {}
 
   Status table(const std::string& ending) {
     const auto a = read_table(command_.first, ending), b = read_table(command_.second, ending);
@@ -62,7 +66,7 @@ class Comparison {
                                    : "differs in the number of records");
         continue;
       }
-      compare(rows, other->second, label, worst);
+      compare(rows, other->second, label, ending == "mov" && has_angles(label), worst);
     }
     for (const auto& [label, rows] : b->rows)
       if (!a->rows.contains(label)) say(ending, label, "is missing in the first");
@@ -82,9 +86,15 @@ class Comparison {
     ++said_;
     std::printf("%-4s label %d %s\n", ending.c_str(), label, what);
   }
-  void compare(const Rows& a, const Rows& b, int label, Worst& worst) {
+  bool has_angles(int label) const {
+    const auto found = orientations_.find(label);
+    return found != orientations_.end() && found->second.starts_with("euler");
+  }
+  /// `angles`: the rows are a node's, with Euler angles [deg] in the columns 4 to 6.
+  void compare(const Rows& a, const Rows& b, int label, bool angles, Worst& worst) {
     for (std::size_t column = 0; !a.empty() && column < a.front().size(); ++column) {
-      Worst here = compare_column(a, b, column);
+      const bool angle = angles && column >= 3 && column < 6;
+      Worst here = compare_column(a, b, column, angle ? 360 : HUGE_VAL);
       if (here.difference <= command_.absolute) continue;
       here.label = label;
       here.column = static_cast<int>(column) + 1;
@@ -103,6 +113,7 @@ class Comparison {
   }
 
   const DiffCommand& command_;
+  const std::map<int, std::string> orientations_;
   bool differ_ = false;
   int said_ = 0;  ///< labels that one side lacks, or has with other records
 };

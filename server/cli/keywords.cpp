@@ -18,6 +18,7 @@ Json to_json(const VocabularyWord& word) {
     json["reason"] = word.reason;
   }
   if (!word.sizes.empty()) json["sizes"] = word.sizes;
+  if (!word.form.empty()) json["form"] = word.form;
   if (!word.grammar.empty()) json["grammar"] = word.grammar;
   Json units = Json::object();
   for (const GrammarArgument& argument : grammar_arguments(word.grammar))
@@ -30,6 +31,7 @@ Json to_json(const VocabularyWord& word) {
 /// [{"name": "joint", "title": "Joints", "form": "joint : <label> , <word> , …", "words": [{"word":
 /// "clamp", "served": true, "support": "yes", "grammar": "<length [m]> , …", "units": {"length":
 /// "m"}, "output": ".jnt: …"},
+/// {"word": "gravity", "form": "gravity : <grammar> ;", …},
 /// {"word": "rotation", "served": false, "support": "dead", "dead": true, "reason": "…"}]}]
 Json to_json(const std::vector<VocabularyGroup>& groups) {
   Json list = Json::array();

@@ -2,7 +2,9 @@
 #include <sys/ioctl.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <charconv>
+#include <cmath>
 #include <map>
 
 #include "cli/chart.h"
@@ -16,12 +18,29 @@ namespace {
 /// Columns of a table that a word stands for, from 1; the label does not count.
 using Words = std::map<std::string, std::vector<int>>;
 
+constexpr int kMatrixColumns = 9, kAngles = 3;
+
+/// Of nodes with three numbers for their orientation: angles, or the rotation vector.
 const Words& node_words() {
   static const Words words = {
       {"x", {1}},       {"y", {2}},       {"z", {3}},       {"e1", {4}},        {"e2", {5}},
       {"e3", {6}},      {"vx", {7}},      {"vy", {8}},      {"vz", {9}},        {"wx", {10}},
       {"wy", {11}},     {"wz", {12}},     {"ax", {13}},     {"ay", {14}},       {"az", {15}},
       {"X", {1, 2, 3}}, {"E", {4, 5, 6}}, {"V", {7, 8, 9}}, {"W", {10, 11, 12}}};
+  return words;
+}
+
+/// Of nodes with nine.
+const Words& node_words_beside_matrix() {
+  static const Words words = [] {
+    Words shifted;
+    for (const auto& [name, columns] : node_words()) {
+      if (name[0] == 'e' || name[0] == 'E') continue;
+      for (const int column : columns)
+        shifted[name].push_back(column > kAngles ? column + kMatrixColumns - kAngles : column);
+    }
+    return shifted;
+  }();
   return words;
 }
 
@@ -83,13 +102,20 @@ Result<Curve> curve_of(const ResultTable& table, const std::vector<double>& time
   return curve;
 }
 
+const Words& words_of(const std::string& prefix, const CurveRequest& request) {
+  static const Words none;
+  if (request.ending == "jnt") return joint_words();
+  if (request.ending != "mov") return none;
+  const auto orientations = read_orientations(prefix);
+  const auto found = orientations.find(request.label);
+  const bool matrix = found != orientations.end() && found->second == "mat";
+  return matrix ? node_words_beside_matrix() : node_words();
+}
+
 /// Adds the curves of one request.
 Status add_curves(const std::string& prefix, const CurveRequest& request,
                   const std::vector<double>& times, std::vector<Curve>& curves) {
-  static const Words none;
-  const Words& words = request.ending == "mov"   ? node_words()
-                       : request.ending == "jnt" ? joint_words()
-                                                 : none;
+  const Words& words = words_of(prefix, request);
   const auto columns = columns_of(request.quantity, words);
   if (!columns) return columns.error();
   const auto table = read_table(prefix, request.ending);
@@ -125,6 +151,15 @@ int plot(const PlotCommand& command) {
   for (const CurveRequest& request : command.curves)
     if (const auto added = add_curves(command.prefix, request, *times, curves); !added)
       return fail(added.error());
+  const auto has_point = [](const Curve& curve) {
+    return std::any_of(curve.y.begin(), curve.y.end(), [](double y) { return std::isfinite(y); });
+  };
+  if (std::none_of(curves.begin(), curves.end(), has_point))
+    return fail(plot_error(
+        times->empty() ? "\"" + command.prefix +
+                             ".out\" has no line of a step, thus no time to draw over; does the "
+                             "deck say `output: none`?"
+                       : "there is nothing to draw: no value is a finite number"));
   constexpr const char* kTime = "time [s]";
   constexpr int kLines = 20;
   if (command.picture.empty()) {

@@ -99,4 +99,19 @@ Result<std::vector<double>> read_times(const std::string& prefix) {
   return times;
 }
 
+std::map<int, std::string> read_orientations(const std::string& prefix) {
+  std::map<int, std::string> orientations;
+  std::ifstream file(prefix + ".log");
+  std::string line, skipped;
+  while (std::getline(file, line)) {
+    if (!line.starts_with("structural node: ")) continue;
+    std::istringstream words(line);
+    int label = 0;
+    std::string kind;
+    words >> skipped >> skipped >> label >> skipped >> skipped >> skipped >> kind;  // x y z
+    if (words) orientations[label] = kind;
+  }
+  return orientations;
+}
+
 }  // namespace mbcosim::cli

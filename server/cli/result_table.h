@@ -24,4 +24,8 @@ Result<ResultTable> read_table(const std::string& prefix, const std::string& end
 /// Instants of the records [s], from PREFIX.out.
 Result<std::vector<double>> read_times(const std::string& prefix);
 
+/// How PREFIX.mov writes the orientations of nodes, by label, from PREFIX.log: "euler123", "phi",
+/// "mat", ... Empty where there is no such file.
+std::map<int, std::string> read_orientations(const std::string& prefix);
+
 }  // namespace mbcosim::cli

@@ -146,6 +146,17 @@ std::vector<ResultFormat> formats_of(const RunOptions& options, const Model& mod
   return formats;
 }
 
+/// As MBDyn names them: after the deck, without its ending; `-o` may be a folder for such files.
+std::string prefix_of(const RunOptions& options) {
+  namespace fs = std::filesystem;
+  const fs::path deck = fs::path(options.deck).replace_extension();
+  if (options.prefix.empty()) return deck.string();
+  std::error_code none;
+  if (options.prefix.back() != '/' && !fs::is_directory(options.prefix, none))
+    return options.prefix;
+  return (fs::path(options.prefix) / deck.filename()).string();
+}
+
 /// ErrorKind::argument when the run would write over, or remove, one of the files `read`.
 Status check_inputs(const std::vector<std::string>& read, const std::vector<std::string>& results,
                     const std::vector<const DeckChannel*>& channels) {
@@ -198,8 +209,8 @@ int run(const RunOptions& options) {
                    port.name.c_str());
 
   if (!has_dof_file(*report.model)) std::fputs(dof_text(*report.model).c_str(), stdout);
-  const std::string prefix = options.prefix.empty() ? options.deck : options.prefix;
-  const auto writer = make_result_writer(formats_of(options, *report.model), prefix, nullptr);
+  const auto writer =
+      make_result_writer(formats_of(options, *report.model), prefix_of(options), nullptr);
   const auto kept = check_inputs(read, writer->paths(*report.model),
                                  coupled ? channels : std::vector<const DeckChannel*>{});
   if (!kept) return complain(kept.error());

@@ -20,6 +20,10 @@ bool Deck::was_refused(const std::string& kind, int label) const {
   return damaged_kinds.count(kind) || (found != damaged.end() && found->second.count(label));
 }
 
+bool Deck::any_was_refused(std::string_view kind) const {
+  return damaged_kinds.contains(kind) || damaged.contains(kind);
+}
+
 void Deck::redefined(DeckCard& card, std::string_view kind, int label, SourceSpan before) {
   card.fail(std::string(kind) + " " + std::to_string(label) + " already defined at " +
                 reading.place(before),

@@ -83,6 +83,8 @@ struct Deck {
   void damage(const std::string& kind, int label);
   /// Was the definition of this entity, or one of its kind without a readable label, refused?
   bool was_refused(const std::string& kind, int label) const;
+  /// Was any of the kind?
+  bool any_was_refused(std::string_view kind) const;
   [[noreturn]] void redefined(DeckCard& card, std::string_view kind, int label, SourceSpan before);
 
   /// Counts one more entity of `kind`; refused when it is more than the deck declared.

@@ -51,6 +51,8 @@ void sort_drives(Model& model) {
 
 void DeckReader::record(Diagnostic diagnostic, const DeckCard& card) {
   card.add_remedy(diagnostic);
+  if (block_ >= Block::nodes && diagnostic.code == "unknown-word" && card.defined_kind().empty())
+    skipped_ = true;
   deck_.reading.report(std::move(diagnostic));
   if (!card.defined_kind().empty()) deck_.damage(card.defined_kind(), card.defined_label());
 }
@@ -261,8 +263,8 @@ void DeckReader::check_counts() {
   for (int k = 0; k < kKinds; ++k) {
     const Count& count = deck_.counts[k];
     const int lack = count.declared ? *count.declared - count.found : 0;
-    if (lack <= 0) continue;
     const KindNames& names = kind_names(static_cast<Kind>(k));
+    if (lack <= 0 || deck_.any_was_refused(names.singular)) continue;
     if (missing.empty() && count.where.file >= 0) where = count.where;
     missing += (missing.empty() ? "" : ", ") + std::to_string(lack) + " " +
                (lack == 1 ? names.singular : names.plural);

@@ -38,8 +38,8 @@ class DeckReader {
   Block latest_ = Block::none;  ///< the last block that was begun
   std::string name_;            ///< of the open block as it was written
   SourceSpan begun_;            ///< its `begin`
-  bool skipped_ = false;        ///< a block of an unknown name: what it defines is not missed
-  bool done_ = false;           ///< `end: elements` was read
+  bool skipped_ = false;  ///< a block or card of an unknown name: what it defines is not missed
+  bool done_ = false;     ///< `end: elements` was read
 };
 
 }  // namespace mbcosim

@@ -19,6 +19,16 @@ std::size_t line_end(std::string_view text, std::size_t at) {
 
 }  // namespace
 
+std::string_view character_at(std::string_view text, std::size_t at) {
+  const auto byte = [&](std::size_t k) {
+    return static_cast<unsigned char>(char_at(text, at + k));
+  };
+  const std::size_t n = byte(0) < 0xc0 ? 1 : byte(0) < 0xe0 ? 2 : byte(0) < 0xf0 ? 3 : 4;
+  for (std::size_t k = 1; k < n; ++k)
+    if ((byte(k) & 0xc0) != 0x80) return text.substr(at, 1);
+  return text.substr(at, n);
+}
+
 std::size_t skip_line_comment(std::string_view text, std::size_t at) {
   while (true) {
     at = text.find('\n', at);

@@ -20,6 +20,14 @@ inline char char_at(std::string_view text, std::size_t at) {
   return at < text.size() ? text[at] : '\0';
 }
 
+/// The whole character at `at` where it is UTF-8, else its byte.
+std::string_view character_at(std::string_view text, std::size_t at);
+inline bool is_ascii(char c) { return static_cast<unsigned char>(c) < 0x80; }
+/// What to do about a character outside ASCII where none may stand.
+inline constexpr char kAsciiAlone[] =
+    "letters with accents, typographic quotes, dashes and blanks may stand in strings and comments "
+    "alone: type this character anew";
+
 /// Past a `#` comment that starts at `at`: at its line end. A backslash before the line end
 /// continues it.
 std::size_t skip_line_comment(std::string_view text, std::size_t at);

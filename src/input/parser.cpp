@@ -83,8 +83,13 @@ class Parser {
     else if (char_at(text_, at) == '"')
       end = std::min(skip_string(text_, at), text_.size());
     else
-      end = std::min(at + 1, text_.size());
+      return character_at(text_, at);
     return text_.substr(at, end - at);
+  }
+
+  [[noreturn]] void fail_unexpected(std::string_view found) {
+    fail(at_, found.size(), "unexpected " + in_quotes(excerpt(found)),
+         is_ascii(peek()) ? "" : kAsciiAlone);
   }
 
   /// What stands at the present place can neither continue nor end the expression.
@@ -117,7 +122,7 @@ class Parser {
     if (c == '=')
       fail(at_, 1, "unexpected \"=\"",
            "comparison is ==; an assignment inside an expression needs parentheses");
-    fail(at_, found.size(), "unexpected " + in_quotes(excerpt(found)));
+    fail_unexpected(found);
   }
 
   [[noreturn]] void fail_missing_semicolon(std::size_t where) const {
@@ -431,7 +436,7 @@ class Parser {
     if (at_ >= text_.size()) fail(at_ ? at_ - 1 : 0, 1, "expression expected");
     if (peek() == ',' || peek() == ';')
       fail(at_, 1, "expression expected before " + in_quotes(token(at_)));
-    fail(at_, token(at_).size(), "unexpected " + in_quotes(excerpt(token(at_))));
+    fail_unexpected(token(at_));
   }
 
   void parentheses() {

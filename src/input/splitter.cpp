@@ -211,10 +211,13 @@ std::optional<Statement> Splitter::next() {
       ++at_;
       continue;
     }
-    if (is_digit(c))
+    if (is_digit(c)) {
       report(begin, 1, "card name expected, number found");
-    else
-      report(begin, 1, "card name expected, found \"" + excerpt(text_.substr(begin, 1)) + '"');
+    } else {
+      const std::string_view found = character_at(text_, begin);
+      report(begin, found.size(), "card name expected, found \"" + excerpt(found) + '"', "syntax",
+             is_ascii(c) ? "" : kAsciiAlone);
+    }
     const End end = find_end(begin, true);
     if (end.trouble == Trouble::none || end.trouble == Trouble::nesting)
       recover(begin, end);

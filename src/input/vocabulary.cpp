@@ -87,6 +87,7 @@ class Collector {
     if (!word.served) return;
     const WordGrammar* g = find_grammar(group, word.word);
     if (!g) return;
+    word.form = g->form;
     word.grammar = g->text;
     word.output = g->output;
     word.note = g->note;

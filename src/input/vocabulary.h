@@ -17,6 +17,7 @@ struct VocabularyWord {
   std::vector<int> sizes;  ///< of constitutive laws: 1, 3, 6
   std::string support;     ///< yes, partly, ignored, not yet, no, dead
   std::string note;        ///< on the support
+  std::string form;        ///< of its statements; empty: that of the group
   std::string grammar;  ///< what stands after the word; `input/grammar/grammar.h` has the notation
   std::string output;   ///< columns of the results, with units
 };

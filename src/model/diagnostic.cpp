@@ -69,12 +69,23 @@ Excerpt excerpt(const std::string& line, int column) {
       column - static_cast<int>(begin) + (cut_before ? 3 : 0)};
 }
 
-/// The blanks that put a caret below `column`; tabs stay tabs, so that both lines indent alike.
-std::string caret_indent(const std::string& line, int column) {
-  std::string indent;
-  const int n = std::min(column - 1, static_cast<int>(line.size()));
-  for (int i = 0; i < n; ++i) indent += line[i] == '\t' ? '\t' : ' ';
-  return indent;
+/// Columns and lengths count bytes.
+bool begins_character(char c) { return (static_cast<unsigned char>(c) & 0xc0) != 0x80; }
+
+/// A caret below `column` with a tail below the rest of `length`; tabs stay tabs, so that both
+/// lines indent alike.
+std::string marks(const std::string& line, int column, int length) {
+  std::string below;
+  const std::size_t begin =
+      std::min(static_cast<std::size_t>(std::max(column - 1, 0)), line.size());
+  const std::size_t end =
+      std::min(begin + static_cast<std::size_t>(std::max(length, 1)), line.size());
+  for (std::size_t i = 0; i < begin; ++i)
+    if (begins_character(line[i])) below += line[i] == '\t' ? '\t' : ' ';
+  below += '^';
+  for (std::size_t i = begin + 1; i < end; ++i)
+    if (begins_character(line[i])) below += '~';
+  return below;
 }
 
 }  // namespace
@@ -86,10 +97,7 @@ std::string Diagnostic::text() const {
   r += std::string(severity_name(severity)) + ": " + printable(message) + "\n";
   if (!source_line.empty()) {
     const Excerpt shown = excerpt(source_line, column);
-    r += "  " + shown.line + "\n  " + caret_indent(shown.line, shown.column) + "^";
-    const int room = static_cast<int>(shown.line.size()) - shown.column;
-    if (length > 1 && room > 0) r += std::string(std::min(length - 1, room), '~');
-    r += "\n";
+    r += "  " + shown.line + "\n  " + marks(shown.line, shown.column, length) + "\n";
   }
   if (!hint.empty()) r += "  hint: " + hint + "\n";
   for (const std::string& t : trail) r += "  " + t + "\n";

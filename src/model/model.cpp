@@ -287,6 +287,14 @@ void start_if_active(const EvalContext& context, State& state, const ElementSet&
   if (set.is_active(state, i)) set.start(context, state, i);
 }
 
+/// Nor has gravity, then.
+EvalContext context_of_start(const Model& model, const State& state) try {
+  return model.context(state, Phase::assembly);
+} catch (const EvaluationError&) {
+  return {
+      .model = &model, .state = &state, .time = state.time, .h = state.h, .phase = Phase::assembly};
+}
+
 }  // namespace
 
 State make_initial_state(const Model& model) {
@@ -324,7 +332,7 @@ State make_initial_state(const Model& model) {
     state.y[node.unknown] = node.value;
     state.yp[node.unknown] = node.rate;
   }
-  const EvalContext context = model.context(state, Phase::assembly);
+  const EvalContext context = context_of_start(model, state);
   for (const auto& set : model.sets)
     for (int i = 0; i < set->size(); ++i) start_if_active(context, state, *set, i);
   return state;

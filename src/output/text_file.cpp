@@ -1,5 +1,8 @@
 #include "output/text_file.h"
 
+#include <fcntl.h>
+#include <sys/file.h>
+#include <sys/stat.h>
 #include <unistd.h>
 
 #include <algorithm>
@@ -10,6 +13,24 @@ namespace mbcosim {
 namespace {
 
 constexpr std::size_t kBuffer = 1 << 15;
+
+/// An empty file of its own, or a pipe or device; null with `errno`. EWOULDBLOCK: it is another
+/// run's, and stays as it is.
+std::FILE* opened_alone(const std::string& path) {
+  constexpr mode_t kAnybody = 0666;  // but for the umask
+  const int file = ::open(path.c_str(), O_WRONLY | O_CREAT | O_CLOEXEC, kAnybody);
+  if (file < 0) return nullptr;
+  struct stat info {};
+  const bool shared = ::fstat(file, &info) == 0 && !S_ISREG(info.st_mode);
+  // Where the file system has no locks it is as if nobody else were there.
+  const bool taken = !shared && ::flock(file, LOCK_EX | LOCK_NB) != 0 && errno == EWOULDBLOCK;
+  if (!taken && (shared || ::ftruncate(file, 0) == 0))
+    if (std::FILE* const opened = ::fdopen(file, "wb")) return opened;
+  const int why = errno;
+  ::close(file);
+  errno = why;
+  return nullptr;
+}
 
 }  // namespace
 
@@ -25,14 +46,17 @@ void TextFile::make_room(std::size_t count) {
 void TextFile::fail() {
   if (!problem_) return;
   problem_ = make_error(ErrorKind::io, "OUTPUT_NOT_WRITTEN",
-                        "cannot write \"" + path_ + "\": " + std::strerror(errno));
+                        "cannot write \"" + path_ + "\": " +
+                            (errno == EWOULDBLOCK ? "another run is writing it; give each a prefix "
+                                                    "of its own"
+                                                  : std::strerror(errno)));
 }
 
 void TextFile::fail_budget() { problem_ = over_budget(*budget_); }
 
 void TextFile::create() {
   if (file_ || !problem_) return;
-  file_ = std::fopen(path_.c_str(), "wb");
+  file_ = opened_alone(path_);
   if (file_)
     std::setvbuf(file_, nullptr, _IONBF, 0);  // the pieces are large already
   else

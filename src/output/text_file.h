@@ -15,6 +15,7 @@ namespace mbcosim {
 
 /// A file that collects text and writes it in large pieces; created with the first byte. What
 /// cannot be written whole ends after its last whole line; the rest is kept and can be tried again.
+/// Nobody else creates it at the same time.
 class TextFile {
  public:
   static constexpr std::int64_t kNone = -1;  ///< size of a file that is not there

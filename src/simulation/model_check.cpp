@@ -7,6 +7,8 @@
 #include "elements/hydraulic/actuator.h"
 #include "elements/hydraulic/dynamic_pipe.h"
 #include "elements/modal/modal_joint.h"
+#include "model/drives/composed_drives.h"
+#include "model/model_part.h"
 
 namespace mbcosim {
 namespace {
@@ -24,6 +26,18 @@ void check_hydraulic_nodes(Reading& reading, const Model& model) {
         hydraulic_node(node) + ": no element is connected to it, nothing determines its pressure",
         "connect an element or remove the node"));
   }
+}
+
+/// No error: such a drive may stand where nothing evaluates it.
+void check_postponed_drives(Reading& reading, const Model& model) {
+  const auto* const postponed = find_part<PostponedLabels>(model);
+  if (!postponed) return;
+  for (const auto& [label, where] : postponed->labels)
+    if (!model.find_drive(label))
+      reading.warn(where,
+                   "postponed to drive caller " + std::to_string(label) +
+                       ", which the deck does not define: it has no value",
+                   "define `drive caller: " + std::to_string(label) + ", ...;`, anywhere");
 }
 
 void check_modal_nodes(Reading& reading, const Model& model) {
@@ -82,6 +96,7 @@ void check_start_pressures(Reading& reading, const Model& model) {
 void check_model(Reading& reading, const Model& model) {
   check_hydraulic_nodes(reading, model);
   check_modal_nodes(reading, model);
+  check_postponed_drives(reading, model);
   check_start_pressures(reading, model);
 }
 

@@ -277,15 +277,23 @@ class Assembly {
   }
 
   /// Why the assembly failed: constraints that contradict each other, or that follow from each
-  /// other; empty when neither is found. Looks for the configuration that violates the constraints
-  /// least, with compliant constraints.
+  /// other; empty when neither is found. Tries more iterations, and then looks for the
+  /// configuration that violates the constraints least, with compliant constraints.
   std::string diagnosis() {
-    constexpr double kCompliance = 1e-6;
     const int iterations = size_ > 20000 ? 10 : 60;
     state_ = start_;
     double change = HUGE_VAL;
     compute_residual();
     if (error(false) <= model_.control.assembly_tolerance) return contradicted_velocities();
+    for (int k = 1; k <= iterations && !is_cancelled() && correct(); ++k) {
+      compute_residual();
+      if (error(true) <= model_.control.assembly_tolerance)
+        return "the constraints are met after " + std::to_string(k) +
+               " iterations: allow as many with `max initial iterations`, or give positions "
+               "nearer to the assembled ones";
+    }
+    state_ = start_;
+    compute_residual();
     for (int k = 0; k < iterations && change > 1e-9; ++k) {
       const std::vector<double> before = state_.y;
       if (is_cancelled() || !correct(kCompliance)) return {};
@@ -297,25 +305,36 @@ class Assembly {
     const std::string fight = contradictions();
     if (!fight.empty()) return fight;
     const NullSpace null = find_null_space(matrix(0), 1e-12, Watch(cancel_));
-    if (null.rank_loss == 0) {
-      return change > 1e-9 ? std::string()
-                           : "the constraints can be met from here: allow more `max initial "
-                             "iterations`, or give positions "
-                             "nearer to the assembled ones";
-    }
+    if (null.rank_loss == 0) return {};
     return "these constraints follow from each other: " +
            joined(owners_of(model_, by_model_row(null.left), 6)) +
            "\n  hint: remove the redundant ones, or regularize a joint " + kRegularization;
   }
 
-  /// The constraints that stay violated, largest violation of each element first.
+  /// The constraints that stay violated, largest violation of each element first. Those that agree
+  /// are violated by the compliance times a multiplier, which is of the order of what moves nodes
+  /// back to where they were given.
   std::string contradictions() const {
     double largest = 0;
     for (int a = node_rows_; a < size_; ++a) largest = std::max(largest, std::abs(r_[rows_[a]]));
-    if (!(largest > 1e-4)) return {};
+    if (!(largest > 100 * kCompliance * std::max(1.0, restoring_load()))) return {};
     return "these constraints contradict each other; the least violation that was found leaves" +
            violations(r_, largest) +
            "\n  hint: correct the positions or orientations given to one of them, or remove one";
+  }
+
+  /// The largest load of the initial stiffness on a node.
+  double restoring_load() const {
+    double largest = 0;
+    for (std::size_t k = 0; k < model_.structural.size(); ++k) {
+      const StructuralNode& node = model_.structural[k];
+      if (node.is_dummy()) continue;
+      for (int i = 0; i < 3; ++i) {
+        const double moved = state_.y[node.first + i] - start_.y[node.first + i];
+        largest = std::max(largest, node.assembly_position_stiffness * std::abs(moved));
+      }
+    }
+    return largest;
   }
 
   /// When the input contradicts nothing else.
@@ -355,6 +374,8 @@ class Assembly {
       r(rows_[a]) = std::max(std::abs(local(a)), std::abs(local(size_ + a)));
     return r;
   }
+
+  static constexpr double kCompliance = 1e-6;  ///< [1/N, with the initial stiffness in N/m]
 
   const Model& model_;
   State& state_;

@@ -63,7 +63,8 @@ class Newton {
       if (const auto verdict =
               judge(settings_, scratch_.residual_history, report.iterations, settled))
         return finish(report, *verdict);
-      if (system_.exceeds_limits(settings_)) return finish(report, NewtonOutcome::not_converged);
+      report.over_limit = system_.exceeds_limits(settings_);
+      if (report.over_limit) return finish(report, NewtonOutcome::not_converged);
       if (hooks_.cancelled()) return finish(report, NewtonOutcome::cancelled);
       if (!correct(report)) return report;
       if (settled && settings_.solution_tolerance > 0 &&

@@ -42,6 +42,7 @@ struct NewtonReport {
   double tolerance = 0;  ///< of the residual test
   double solution_error = 0;
   bool by_solution = false;  ///< accepted by the solution test
+  bool over_limit = false;   ///< not converged: the residual exceeded `max residual`
   int singular_column = -1;
 };
 

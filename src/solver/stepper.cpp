@@ -501,8 +501,14 @@ double Stepper::step_size(const State& state, SinceChange& since) const {
   const EvalContext context = model_.context(state, Phase::step);
   const double largest = s.max_time_step ? s.max_time_step->value(context) : HUGE_VAL;
   const double limit = largest > 0 ? largest : HUGE_VAL;
-  if (s.strategy == StepStrategy::change)
-    return std::max(std::min(s.strategy_change->value(context), limit), s.min_time_step);
+  if (s.strategy == StepStrategy::change) {
+    const double asked = s.strategy_change->value(context);
+    const double length = std::max(std::min(asked, limit), s.min_time_step);
+    if (length > 0) return length;
+    char text[96];
+    std::snprintf(text, sizeof text, "`strategy: change` asks for a step of %g s", asked);
+    throw EvaluationError(std::string(text) + ": a step is longer than 0");
+  }
   since.reduction += 1;
   since.raise += 1;
   const std::int64_t iterations = state.control.last_iterations;
@@ -560,9 +566,15 @@ Error Stepper::failure(const NewtonReport& report, const State& state, const cha
   if (!std::isfinite(report.residual_error)) {
     std::snprintf(text, sizeof text, "the residual has no value after %d iterations",
                   report.iterations);
-    return not_converged(text);
+    Error e = not_converged(text);
+    e.failure.worst = worst_equations(model_, workspace_.residual);
+    for (const WorstEquation& w : e.failure.worst)
+      if (!std::isfinite(w.residual)) e.message += "\n  " + w.owner + ", " + w.equation;
+    return e;
   }
-  std::snprintf(text, sizeof text, "no convergence in %d iterations, residual %.6g, tolerance %.6g",
+  std::snprintf(text, sizeof text, "%s %d iterations, residual %.6g, tolerance %.6g",
+                report.over_limit ? "the residual exceeds the card `max residual` after"
+                                  : "no convergence in",
                 report.iterations, report.residual_error, report.tolerance);
   Error e = not_converged(text);
   e.failure.worst = worst_equations(model_, workspace_.residual);
@@ -589,7 +601,12 @@ void Stepper::explain(PhaseReport& report, const State& state) {
   const std::vector<double>& history = e.failure.residual_history;
   const bool in_step = e.failure.time > state.time;
   std::string remedy;
-  if (!in_step || !goes_to_and_fro(history)) remedy = remedy_by_units(model_, state);
+  if (!history.empty() && !std::isfinite(history.front()))
+    remedy =
+        "nothing was iterated yet: a load, a law or a drive of what these equations belong to "
+        "has no finite value";
+  if (remedy.empty() && (!in_step || !goes_to_and_fro(history)))
+    remedy = remedy_by_units(model_, state);
   if (remedy.empty() && in_step)
     remedy = remedy_by_cause(model_, state, e.failure.time - state.time);
   if (remedy.empty()) cause = find_near_singularity(model_, workspace_.values);

@@ -48,8 +48,8 @@ def anchors_of(words):
 
 
 def statement(group, word):
-    """The form of the group with the word and its grammar."""
-    form = group.get("form", "<word>")
+    """The form of the word, or of its group, with the word and its grammar."""
+    form = word.get("form") or group.get("form", "<word>")
     if "grammar" not in word:
         form = re.sub(r"\[ (: |, )?<grammar> \]|[:,] <grammar>", "", form)
     text = form.replace("<word>", word["word"]).replace("<grammar>", word.get("grammar", ""))

@@ -1,4 +1,5 @@
 """The command line: exit codes, output, and the same numbers as the service."""
+import contextlib
 import json
 import os
 import re
@@ -11,7 +12,7 @@ import numpy as np
 import pytest
 
 import decks
-from conftest import BIN, TIME_FACTOR
+from conftest import BIN, TIME_FACTOR, wait_for
 
 MBCOSIM = os.path.join(BIN, "mbcosim")
 
@@ -40,6 +41,40 @@ def test_run_writes_what_the_service_gives(server, deck, tmp_path):
 def test_default_prefix_is_the_decks_name(deck, tmp_path):
     assert mbcosim("run", "deck", cwd=tmp_path).returncode == 0
     assert (tmp_path / "deck.mov").exists()
+    os.rename(deck, tmp_path / "wing.v2.mbd")
+    assert mbcosim("run", "wing.v2.mbd", cwd=tmp_path).returncode == 0
+    assert (tmp_path / "wing.v2.mov").exists()
+
+
+@pytest.mark.parametrize("folder", ["results", "results/"])
+def test_a_folder_takes_files_of_the_decks_name(deck, tmp_path, folder):
+    (tmp_path / "results").mkdir()
+    assert mbcosim("run", str(deck), "-o", folder, cwd=tmp_path).returncode == 0
+    assert {"deck.mov", "deck.out", "deck.log"} <= {path.name for path in (tmp_path / "results").iterdir()}
+
+
+@contextlib.contextmanager
+def endless_run(deck):
+    """A run that has written results; it is interrupted at the end."""
+    deck.write_text(decks.endless())
+    process = subprocess.Popen([MBCOSIM, "run", str(deck)], stderr=subprocess.DEVNULL)
+    output = deck.with_suffix(".mov")
+    try:
+        wait_for(lambda: output.exists() and output.stat().st_size > 0)
+        yield
+    finally:
+        process.send_signal(signal.SIGINT)
+        assert process.wait(60 * TIME_FACTOR) == 130
+
+
+def test_two_runs_do_not_write_the_same_files(tmp_path):
+    deck = tmp_path / "deck"
+    with endless_run(deck):
+        second = mbcosim("run", str(deck))
+        assert second.returncode == 4 and "another run is writing it; give each a prefix of its own" in second.stderr
+    assert np.isfinite(np.loadtxt(tmp_path / "deck.mov")).all()  # whole lines, in order
+    deck.write_text(decks.body())
+    assert mbcosim("run", str(deck)).returncode == 0  # what is left of a run that has ended is in nobody's way
 
 
 def test_deck_errors_exit_with_2(tmp_path):
@@ -323,15 +358,8 @@ def test_messages_name_files_as_they_were_typed(deck, tmp_path):
 
 
 def test_interrupt_exits_with_130(tmp_path):
-    deck = tmp_path / "deck"
-    deck.write_text(decks.endless())
-    process = subprocess.Popen([MBCOSIM, "run", str(deck)], stderr=subprocess.DEVNULL)
-    output = tmp_path / "deck.mov"
-    deadline = time.monotonic() + 60 * TIME_FACTOR
-    while not (output.exists() and output.stat().st_size) and time.monotonic() < deadline:
-        time.sleep(0.05)
-    process.send_signal(signal.SIGINT)
-    assert process.wait(60 * TIME_FACTOR) == 130
+    with endless_run(tmp_path / "deck"):
+        pass
 
 
 def test_validate_warns_of_a_deck_that_run_would_refuse(tmp_path):

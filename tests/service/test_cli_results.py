@@ -116,6 +116,29 @@ def test_plot_of_a_run_without_text_says_what_is_missing(tmp_path):
     assert drawn.returncode == 4 and '"p.nc": text is read here, which `mbcosim run DECK -o p` writes without `--format netcdf`' in drawn.stderr
 
 
+def test_plot_knows_how_orientations_are_written(swing, tmp_path):
+    """A matrix has nine numbers, between which no angle is."""
+    deck = open(os.path.join(MODELS, "pendulum.mbd")).read()
+    (tmp_path / "deck").write_text(deck.replace("begin: control data;", "begin: control data; default orientation: orientation matrix;"))
+    assert mbcosim("run", "deck", "-o", "m", cwd=tmp_path).returncode == 0
+    for quantity in ("x", "vz", "wy", "V"):
+        angles = mbcosim("plot", "p", "--node", 2, quantity, cwd=swing)
+        matrix = mbcosim("plot", "m", "--node", 2, quantity, cwd=tmp_path)
+        assert (matrix.returncode, matrix.stdout) == (0, angles.stdout) and "node 2 " in angles.stdout
+    assert mbcosim("plot", "m", "--node", 2, "4", cwd=tmp_path).returncode == 0
+    drawn = mbcosim("plot", "m", "--node", 2, "e1", cwd=tmp_path)
+    assert drawn.returncode == 4 and '"e1" is no quantity; there are V W X' in drawn.stderr
+
+
+def test_plot_of_nothing_is_refused(tmp_path):
+    (tmp_path / "o").write_text(OSCILLATOR.replace("begin: initial value;", "begin: initial value; output: none;"))
+    assert mbcosim("run", "o", "-o", "p", cwd=tmp_path).returncode == 0
+    for options in ((), ("--png", "p.svg")):
+        drawn = mbcosim("plot", "p", "--node", 1, "z", *options, cwd=tmp_path)
+        assert drawn.returncode == 4 and '"p.out" has no line of a step' in drawn.stderr and not drawn.stdout
+    assert not (tmp_path / "p.svg").exists()
+
+
 def test_plot_names_what_lacks(swing, tmp_path):
     for arguments, text in ((("q", "--node", 2, "z"), 'cannot read "q.out": No such file or directory; `mbcosim run DECK -o q`'),
                             (("p", "--node", 7, "z"), "p.mov has no label 7; there are 1 2"),
@@ -152,6 +175,17 @@ def test_diff_tells_same_results_and_the_largest_difference(swing, tmp_path):
     assert "jnt  is missing in the second" in mbcosim("diff", swing / "p", "q", cwd=tmp_path).stdout
     nothing = mbcosim("diff", swing / "p", "nothing", cwd=tmp_path)
     assert nothing.returncode == 4 and 'there are no results "nothing.*"' in nothing.stderr
+
+
+def test_diff_of_angles_does_not_count_whole_turns(swing, tmp_path):
+    """An angle about 180 degrees is written with either sign."""
+    for path in swing.glob("p.*"):
+        shutil.copy(path, tmp_path / path.name.replace("p.", "q."))
+    rows = [line.split() for line in (swing / "p.mov").read_text().splitlines()]
+    for column, answer in ((4, "mov  same"), (7, "mov  differs: 360 in label")):
+        turned = [[*row[:column], repr(float(row[column]) + 360), *row[column + 1:]] for row in rows]
+        (tmp_path / "q.mov").write_text("\n".join(map(" ".join, turned)) + "\n")
+        assert answer in mbcosim("diff", swing / "p", "q", cwd=tmp_path).stdout
 
 
 def test_diff_tells_runs_of_another_length(swing, tmp_path):

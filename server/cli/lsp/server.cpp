@@ -107,10 +107,13 @@ std::string bare(const std::string& text) {
   return result;
 }
 
-/// How a statement with the word is written: the form of its group with the word and its grammar.
+/// How a statement with the word is written: its form, or its group's, with the word and its
+/// grammar.
 std::string statement_of(const VocabularyGroup& words, const VocabularyWord& word) {
   if (word.grammar.empty()) return "";
-  std::string text = words.form.empty() ? "<word> , <grammar>" : words.form;
+  std::string text = !word.form.empty()   ? word.form
+                     : words.form.empty() ? "<word> , <grammar>"
+                                          : words.form;
   for (const auto& [name, value] :
        {std::pair<std::string, std::string>{"<word>", word.word}, {"<grammar>", word.grammar}})
     if (const std::size_t at = text.find(name); at != std::string::npos)

@@ -42,7 +42,7 @@ c81 data
 license
 warranty
 for
-  = <variable> , <first> , <last> [ , <step> ]
+  = integer <variable> = <first> , <last> [ , <step> ]
 end for
 if
   = <expression>

@@ -28,6 +28,7 @@ parameter
 const char* const kElements = R"(
 @ element | <word> : <label> , [ name , "<name>" , ] <grammar> [ , output , <yes or no> ] ;
 automatic structural
+  : automatic structural : <grammar> ;
   = <node> , <vec3> , <vec3> , <vec3> , <vec3>
 beam3
   = <node 1> , [ position , ] <offset> , [ { orientation | rot } , <orientation> , ] <node 2> , [ position , ] <offset> , [ { orientation | rot } , <orientation> , ] <node 3> , [ position , ] <offset> , [ { orientation | rot } , <orientation> , ] { from nodes | <absolute orientation> } , <law 6> , { same | from nodes | [ orientation , ] <absolute orientation> } , { same | <law 6> } [ , piezoelectric actuator , <n actuators> , ( <abstract node> ) * n actuators , <6 rows> , { same | <6 rows> } ] [ , custom output , <beam output> ]
@@ -42,6 +43,7 @@ hbeam
   = <node 1> , <offset> , [ { orientation | rot } , <orientation> , ] <node 2> , <offset> , [ { orientation | rot } , <orientation> , ] <elastic law 6>
   > .act: as `beam2`
 bind
+  : bind : <grammar> ;
   = { <joint> , joint , <element parameter node> , { { string | name } , "<private datum>" | [ index , ] <n datum> } }
 body
   = <node> , { condense , 2 , ( <mass [kg]> , <offset> , <inertia> [ , { inertial | orientation } , { node | <orientation> } ] ) * 2 | [ allow negative mass , ] <mass [kg]> , <offset> , <inertia> [ , { inertial | orientation } , { node | <orientation> } ] | variable mass , <drive> , <vec3 drive> , <mat3 drive> , <mat3 drive> }
@@ -60,6 +62,7 @@ force
 genel
   = <type of the genel group>
 gravity
+  : gravity : <grammar> ;
   = { [ uniform , ] <vec3 drive> | central , [ origin , <position> , ] mass , <mass [kg]> , G , { si | <G [m3/(kg s2)]> } } [ , output , <yes or no> ]
   > .grv: acceleration (3)
   ! yes: without label
@@ -73,6 +76,7 @@ joint regularization
   = <type of the jointregularization group>
   ! yes: signs of the rows as in the reference solver: with some joints (revolute and spherical ones) it drives the points apart instead of giving way
 output
+  : output : <grammar> ;
   = <head> , { <label> | range , <first label> , <last label> }
 output element
   = { stream | socket stream } , <stream>

@@ -43,6 +43,8 @@ void read_texts(const char* texts, std::map<std::string, GroupGrammar>& all) {
       word = &group->words[normalized(line)];
       word->word = line;
       group->written.push_back(line);
+    } else if (line[2] == ':') {
+      word->form = content(line);
     } else if (line[2] == '=') {
       word->text = content(line);
     } else if (line[2] == '>') {
@@ -88,7 +90,7 @@ std::string written_form(std::string_view group, std::string_view word) {
   constexpr std::size_t kLongest = 400;  // bytes
   const WordGrammar* const w = find_grammar(group, word);
   if (!w) return "";
-  std::string form = grammars().at(std::string(group)).form;
+  std::string form = w->form.empty() ? grammars().at(std::string(group)).form : w->form;
   settle_optional(form, ":", !w->text.empty());
   settle_optional(form, ",", !w->text.empty());
   replace(form, "<word>", w->word);

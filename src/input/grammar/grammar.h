@@ -3,6 +3,7 @@
 ///
 ///     @ joint | joint : <label> , <word> , <grammar> ;        a group and the form of its
 ///     statements clamp                                                   a word
+///       : joint : <grammar> ;                                 where its statements have another form
 ///       = <node> , [ position , ] { node | <position> }       what stands after it
 ///       > .jnt: F [N] (3)                                     what it writes
 ///       ! partly: without friction                            yes | partly | ignored | no | not
@@ -27,6 +28,7 @@ namespace mbcosim {
 
 struct WordGrammar {
   std::string word;     ///< as written in documentation
+  std::string form;     ///< of its statements; empty: that of the group
   std::string text;     ///< what stands after the word
   std::string output;   ///< columns, with units
   std::string support;  ///< empty: `yes`

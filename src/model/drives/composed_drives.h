@@ -92,6 +92,11 @@ class PeriodicDrive : public Drive {
   DrivePtr f_;
 };
 
+/// What `postponed` drives name, and where: a ModelPart.
+struct PostponedLabels {
+  std::vector<std::pair<int, SourceSpan>> labels;
+};
+
 /// The drive caller with a label, looked up when it is evaluated. Its derivative is 0 when that
 /// drive has none.
 class PostponedDrive : public Drive {

@@ -67,18 +67,24 @@ std::string header_value(std::string_view comment, std::string_view key) {
                                               : std::string(trimmed(comment.substr(1), kBlanks));
 }
 
-/// Appends the first `columns` numbers of a line; false when there are fewer.
-bool append_row(std::string_view line, int columns, std::vector<double>& values) {
+/// Appends the `columns` numbers that a line has; what is wrong when there are others.
+std::string append_row(std::string_view line, int columns, std::vector<double>& values) {
+  const std::string expected = std::to_string(columns) + " numbers expected";
   for (int k = 0; k < columns; ++k) {
     line = trimmed(line, kBlanks);
     if (!line.empty() && line[0] == '+') line.remove_prefix(1);
     double v = 0;
     const auto [end, error] = std::from_chars(line.data(), line.data() + line.size(), v);
-    if (error != std::errc()) return false;
+    if (error != std::errc()) return expected;
+    const std::string_view number = line.substr(0, end - line.data());
+    if (!std::isfinite(v)) return '"' + std::string(number) + "\" is no finite number";
     values.push_back(v);
-    line.remove_prefix(end - line.data());
+    line.remove_prefix(number.size());
   }
-  return true;
+  constexpr std::size_t kShown = 40;
+  line = trimmed(line, kBlanks);
+  if (line.empty() || line[0] == '#') return "";
+  return expected + ", then comes \"" + std::string(line.substr(0, kShown)) + '"';
 }
 
 }  // namespace
@@ -96,9 +102,8 @@ SampleText parse_samples(const std::string& text, int columns) {
       if (std::string v = header_value(line, "time step"); !v.empty()) r.time_step = v;
       continue;
     }
-    if (!append_row(line, columns, r.values)) {
-      r.error =
-          "line " + std::to_string(number) + ": " + std::to_string(columns) + " numbers expected";
+    if (const std::string wrong = append_row(line, columns, r.values); !wrong.empty()) {
+      r.error = "line " + std::to_string(number) + ": " + wrong;
       return r;
     }
     ++r.rows;

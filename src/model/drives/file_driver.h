@@ -82,8 +82,8 @@ class StreamDriver : public FileDriver {
   int memory_;  ///< offset in State::memory (channels)
 };
 
-/// Rows of a sample file: numbers separated by blanks, one row a line; lines that start with `#`
-/// are comments.
+/// Rows of a sample file: numbers separated by blanks or commas, one row a line; from `#` on it is
+/// a comment.
 struct SampleText {
   std::vector<double> values;  ///< (rows × columns), by rows
   int rows = 0;

@@ -1,6 +1,7 @@
 #include "model/drives/composed_drives.h"
 #include "model/drives/readers.h"
 #include "model/model.h"
+#include "model/model_part.h"
 
 namespace mbcosim {
 
@@ -154,7 +155,9 @@ void register_composed_drives(Registry& registry) {
   registry.drive({"drive"}, read_chain);
   registry.drive({"periodic"}, read_periodic);
   registry.drive({"postponed"}, [](Card& card) {
-    return std::make_shared<PostponedDrive>(card.label("drive caller"));
+    const int label = card.label("drive caller");
+    part<PostponedLabels>(card.builder()).labels.emplace_back(label, card.last());
+    return std::make_shared<PostponedDrive>(label);
   });
   registry.drive({"scalar function"}, [](Card& card) {
     return std::make_shared<ScalarFunctionDrive>(card.scalar_function());

@@ -62,7 +62,8 @@ void RandomDrive::advance(const EvalContext& context, State& state, bool) const 
     value = range_.mean;
     return;
   }
-  if (state.step % range_.steps != 0) return;
+  const bool is_first = value == range_.mean;
+  if (state.step % range_.steps != 0 && !is_first) return;
   generator = static_cast<double>(next_random(static_cast<std::uint64_t>(generator)));
   value = range_.mean + range_.amplitude * (2 * generator / static_cast<double>(kModulus) - 1);
 }

@@ -54,7 +54,8 @@ class ClosestNextDrive : public RememberedDrive {
   DrivePtr increment_;
 };
 
-/// m + A u, u uniform in [−1, 1], a new u at every N-th step within [t0, t1]; m outside.
+/// m + A u, u uniform in [−1, 1], a new u at the first and at every N-th step within [t0, t1]; m
+/// outside.
 ///
 /// Each drive has its own generator (48-bit linear congruential), so that runs are reproducible.
 class RandomDrive : public RememberedDrive {

@@ -215,6 +215,40 @@ TEST(MalformedDeck, HasOneErrorForAMisspelledBlock) {
   EXPECT_EQ(findings(load(text).diagnostics), "error: unknown block \"nods\"");
 }
 
+TEST(MalformedDeck, NamesTheBlockOfACardThatStandsInAnother) {
+  const auto of = [](const DeckText& deck) {
+    const Diagnostic d = load(deck).diagnostics.at(0);
+    return d.message + ": " + d.hint;
+  };
+  EXPECT_EQ(of(elements("structural: 2, static, null, eye, null, null;")),
+            "card \"structural\" cannot stand here: it belongs to the block nodes");
+  EXPECT_EQ(of(nodes("joint: 1, clamp, 1, node, node;")),
+            "card \"joint\" cannot stand here: it belongs to the block elements");
+  EXPECT_EQ(of(initial_value("default output: all;")),
+            "card \"default output\" cannot stand here: it belongs to the block control "
+            "data");
+  EXPECT_EQ(of(control("time step: 1.;")),
+            "card \"time step\" cannot stand here: it belongs to the block initial value");
+  EXPECT_EQ(of(control("file: 1, fixed step;")),
+            "card \"file\" cannot stand here: it belongs to the block drivers");
+}
+
+/// What a refused card defines is not missed, too; others of its kind may be.
+TEST(MalformedDeck, HasOneErrorForARefusedElement) {
+  const std::string clamp = "joint: 1, clamp, 1, node, node;";
+  const auto of = [&](const std::string& card) {
+    return findings(load(elements(clamp + card, kDynamic, "joints: 2;")).diagnostics);
+  };
+  EXPECT_EQ(of("joint: 1, clamp, 1, node, node;"), "error: joint 1 already defined at deck.mbd:12");
+  EXPECT_EQ(of("joint: 2, clmp, 1, node, node;"), "error: joint 2: unknown joint type \"clmp\"");
+  EXPECT_EQ(of("jont: 2, clamp, 1, node, node;"), "error: unknown card \"jont\"");
+  EXPECT_EQ(of("joint: two, clamp, 1, node, node;"), "error: unknown variable \"two\"");
+  EXPECT_EQ(of(""), "error: end of the deck: 1 joint missing");
+  EXPECT_EQ(of("body: 1, 7, 1., null, eye;"),
+            "error: body 1: structural node 7 is not defined\n"
+            "error: end of the deck: 1 joint missing");
+}
+
 /// A card that is refused after what it says of its output has made no drive.
 TEST(MalformedDeck, HasNoDriveOfARefusedCardToWrite) {
   DeckText deck = elements("drive caller: 1, time, 5.; drive caller: 2, time;");
@@ -336,7 +370,7 @@ TEST(Blocks, AreCheckedForOrderAndBalance) {
       {"begin: data; end: data;\nbegin: multistep; end: multistep;\n" + control_data,
        "warning: deprecated: write \"initial value\""},
       {"end: nodes;", "error: \"end: nodes\" without its \"begin\""},
-      {"time step: 1;", "error: unknown card \"time step\""},
+      {"time step: 1;", "error: card \"time step\" cannot stand here"},
       {"set: integer a = 3;", ""},
   };
   for (const auto& c : cases) EXPECT_EQ(findings(load(c.first).diagnostics), c.second) << c.first;

@@ -24,6 +24,11 @@ TEST_P(Malformed, IsRefusedWithThisMessage) {
 
 constexpr Case kExpressions[] = {
     {"remark: nope;", R"(1:9: error: unknown variable "nope")"},
+    {"remark: \u22121;", "1:9: error: unexpected \"\u2212\""},
+    {"remark: 1\u00a0+ 2;", "1:10: error: unexpected \"\u00a0\""},
+    {"remark: \u03b1;", "1:9: error: unexpected \"\u03b1\""},
+    {"remark: \xe9;", "1:9: error: unexpected \"\xe9\""},
+    {"\u00a0remark: 1;", "1:1: error: card name expected, found \"\u00a0\""},
     {"remark: Pi;",
      R"(1:9: error: unknown variable "Pi"; names are case sensitive; did you mean "pi"?)"},
     {"remark: Sin(1);",
@@ -128,7 +133,7 @@ constexpr Case kStatements[] = {
     {"remark: 1; /* abc", "1:12: error: unterminated comment"},
     {"remark: 1", "1:9: error: \";\" expected at end of file"},
     {"123: 4;", "1:1: error: card name expected, number found"},
-    {"\xC3\xA9: 4;", "1:1: error: card name expected, found \"\xC3\""},
+    {"\xC3\xA9: 4;", "1:1: error: card name expected, found \"\xC3\xA9\""},
     {"remark: 1,\n 2\nremark: 3;",
      "3:1: error: \";\" expected at the end of the card begun at line 1"},
     {"remark: null eye, 1;", R"(1:14: error: "," expected after "null")"},

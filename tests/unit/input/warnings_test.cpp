@@ -26,6 +26,17 @@ std::string of_elements(const std::string& cards) {
   return findings(load(d).diagnostics);
 }
 
+TEST(PostponedDrive, IsNamedWhereItsDriveNeverComes) {
+  EXPECT_EQ(
+      of_elements("drive caller: 1, array, 2, postponed, 2, postponed, 3; drive caller: 2, "
+                  "const, 1.;"),
+      "warning: postponed to drive caller 3, which the deck does not define: it has no value");
+  DeckText d;
+  d.nodes = kNode;
+  d.elements = "drive caller: 1,\npostponed, 3;";
+  EXPECT_EQ(load(d).diagnostics.at(0).source_line, "postponed, 3;");
+}
+
 // ------------------------------------------------------------------------------------ frozen
 // values
 

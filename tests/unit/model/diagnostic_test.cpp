@@ -25,6 +25,12 @@ TEST(DiagnosticText, ShowsTheLineWithACaret) {
             "deck.mbd:7:9: error: no\n  \tjoint: 1;\n  \t       ^~\n");
 }
 
+/// Positions count bytes, eyes characters.
+TEST(DiagnosticText, ShowsTheCaretBelowCharactersOfManyBytes) {
+  const std::string line = "\u00e9\u2212 \u2212\u03b1x";
+  EXPECT_EQ(at(line, 7, 5).text(), "deck.mbd:7:7: error: no\n  " + line + "\n     ^~\n");
+}
+
 TEST(DiagnosticText, CutsLongLinesAroundTheColumn) {
   const std::string line = std::string(500, 'a') + "X" + std::string(500, 'b');
   const std::string text = at(line, 501).text();

@@ -422,7 +422,7 @@ TEST_F(DriveTable, BailoutEndsTheRun) {
 
 TEST(SampleText, ReadsRowsCommentsAndHeader) {
   const SampleText s =
-      parse_samples("# initial time: 0.25\n# time step: .5\n\n 1 -2e1\n+3,\t4 ignored\n5 6", 2);
+      parse_samples("# initial time: 0.25\n# time step: .5\n\n 1 -2e1\n+3,\t4 # comment\n5 6", 2);
   EXPECT_EQ(s.error, "");
   EXPECT_EQ(s.rows, 3);
   EXPECT_EQ(s.values, (std::vector<double>{1, -20, 3, 4, 5, 6}));
@@ -430,8 +430,16 @@ TEST(SampleText, ReadsRowsCommentsAndHeader) {
   EXPECT_EQ(s.time_step, ".5");
 }
 
-TEST(SampleText, NamesTheLineThatIsTooShort) {
-  EXPECT_EQ(parse_samples("1 2\n# c\n3\n", 2).error, "line 3: 2 numbers expected");
+/// Decimal commas and columns that belong to no channel make other numbers of the same text.
+TEST(SampleText, NamesTheLineThatDoesNotFit) {
+  const auto error = [](const std::string& text) { return parse_samples(text, 2).error; };
+  EXPECT_EQ(error("1 2\n# c\n3\n"), "line 3: 2 numbers expected");
+  EXPECT_EQ(error("0,5 1,2\n"), "line 1: 2 numbers expected, then comes \"1,2\"");
+  EXPECT_EQ(error("1 2\n3 4 5 6\n"), "line 2: 2 numbers expected, then comes \"5 6\"");
+  EXPECT_EQ(error("1 2m\n"), "line 1: 2 numbers expected, then comes \"m\"");
+  for (const char* word : {"nan", "inf", "-inf"})
+    EXPECT_EQ(error("1 " + std::string(word)),
+              "line 1: \"" + std::string(word) + "\" is no finite number");
 }
 
 TEST_F(DriveTable, MeterCountsStepsFromTheStart) {
@@ -484,6 +492,26 @@ TEST_F(DriveTable, RandomStaysInRangeAndHoldsForItsSteps) {
   }
   EXPECT_EQ(changes, 197);
   EXPECT_LT(std::abs(sum / 785), 0.3);
+}
+
+/// Not with the first multiple of its steps.
+TEST_F(DriveTable, RandomBeginsWithItsTime) {
+  const int memory = allocate(RandomDrive::kMemory, 5);
+  state_.memory[memory + 1] = RandomDrive::seeded(1);
+  const auto drive =
+      listen(std::make_shared<RandomDrive>(memory, RandomDrive::Range{2, 5, 1.03, 50, 40}));
+  std::vector<double> values;
+  for (int k = 0; k <= 40; ++k) {
+    advance_to(k);
+    const double v = drive->value(context(), 0);
+    if (state_.time < 1.03) {
+      EXPECT_EQ(v, 5);
+    } else if (values.empty() || v != values.back()) {
+      values.push_back(v);
+    }
+  }
+  ASSERT_EQ(values.size(), 2u);  // at once, and at step 40
+  EXPECT_NE(values[0], 5);
 }
 
 TEST_F(DriveTable, RandomRepeatsFromACopiedState) {

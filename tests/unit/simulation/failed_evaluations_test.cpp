@@ -9,6 +9,7 @@
 namespace mbcosim::failed_evaluations_test {
 namespace {
 
+using testing::AllOf;
 using testing::HasSubstr;
 
 /// A drive without a value after t = 0.25 s.
@@ -63,6 +64,31 @@ INSTANTIATE_TEST_SUITE_P(
                            std::string(kUntil) + ";"),
                     pushed("strategy: factor, .5, 1, 1.2, 1, 1, 5; min time step: 1e-3;", "",
                            kUntil)));
+
+/// Gravity is evaluated before anything else is.
+TEST(FailedEvaluation, OfGravityIsAnErrorOfTheStart) {
+  std::string deck = pushed("", "gravity;");
+  deck.insert(deck.find("force: 1"), "gravity: 0., 0., -1., string, \"9.81/Time\"; ");
+  const LoadReport report = load_deck(BundleSource({{"deck.mbd", deck}}), "deck.mbd");
+  ASSERT_TRUE(report.ok()) << report.diagnostics.at(0).text();
+  const auto simulation = Simulation::create(report.model);
+  ASSERT_FALSE(simulation);
+  EXPECT_EQ(simulation.error().kind, ErrorKind::evaluation);
+  EXPECT_THAT(simulation.error().message,
+              AllOf(HasSubstr("before the first step: "), HasSubstr("division by zero")));
+}
+
+/// A root of what is negative has no value, and throws nothing.
+TEST(FailedEvaluation, OfALoadNamesWhereItActs) {
+  DeckRun run(pushed("", "", "string, \"(-Time)^0.5\""));
+  ASSERT_TRUE(run.ready());
+  const StepReport report = run.simulation().step();
+  ASSERT_TRUE(report.error);
+  EXPECT_THAT(report.error->message,
+              AllOf(HasSubstr("the residual has no value after 0 iterations"),
+                    HasSubstr("structural node 1, force balance x"),
+                    HasSubstr("a load, a law or a drive of what these equations belong to")));
+}
 
 TEST(FailedEvaluation, OfAVariableIsNotANumber) {
   DeckRun run(pushed("", "", "const, 1.", "drive caller: 7, " + std::string(kUntil) + ";"));

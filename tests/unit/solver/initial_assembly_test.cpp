@@ -97,13 +97,26 @@ TEST(InitialAssembly, NamesRedundantConstraints) {
   EXPECT_THAT(message, HasSubstr("jacobian, 1e-12"));
 }
 
-TEST(InitialAssembly, AsksForIterationsWhenTheyAreMissing) {
-  std::string text = deck("structural: 1, dynamic, .1,0.,0., eye, null, null;\n",
-                          body(1) + "joint: 1, spherical pin, 1, .5,0.,0., 0.,0.,.5;\n", 1, 1);
-  const std::string cards = "max initial iterations: 30;";
-  text.replace(text.find(cards), cards.size(), "max initial iterations: 1;");
-  EXPECT_THAT(failure(text),
-              AllOf(HasSubstr("after 1 iterations"), HasSubstr("max initial iterations")));
+/// A quarter of a turn; a gap of five times the arm; the same in millimetres, where the springs of
+/// the nodes hold with thousands.
+TEST(InitialAssembly, AsksForTheIterationsThatAreMissing) {
+  for (const auto& [node, pin] :
+       {std::pair(".1,0.,0.", ".5,0.,0., 0.,0.,.5"), std::pair("1.,0.,0.", "-1.,0.,5., null"),
+        std::pair("1000.,0.,0.", "-1000.,0.,1000., null")}) {
+    std::string text = deck("structural: 1, dynamic, " + std::string(node) + ", eye, null, null;\n",
+                            body(1) + "joint: 1, spherical pin, 1, " + pin + ";\n", 1, 1);
+    const std::string card = "max initial iterations: ";
+    const std::size_t number = text.find(card + "30;") + card.size();
+    text.replace(number, 2, "1");
+    const std::string message = failure(text), told = "the constraints are met after ";
+    EXPECT_THAT(message, AllOf(HasSubstr("after 1 iterations"), HasSubstr(told)));
+    const int enough = std::atoi(message.c_str() + message.find(told) + told.size());
+    EXPECT_GT(enough, 1) << message;
+    text.replace(number, 1, std::to_string(enough));
+    EXPECT_TRUE(DeckRun(text).ready()) << message;
+    text.replace(number, std::to_string(enough).size(), std::to_string(enough - 1));
+    EXPECT_THAT(failure(text), HasSubstr(told + std::to_string(enough)));
+  }
 }
 
 TEST(InitialAssembly, IsSkippedOnRequest) {

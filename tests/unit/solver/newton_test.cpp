@@ -273,6 +273,9 @@ TEST(Convergence, MaxResidualStopsTheIteration) {
       first_steps("time step: 1e-2; max iterations: 20; tolerance: 1e-9; max residual: 1e-8;", 1);
   ASSERT_TRUE(report.error);
   EXPECT_EQ(report.error->failure.iteration, 0);
+  EXPECT_THAT(
+      report.error->message,
+      testing::HasSubstr("the residual exceeds the card `max residual` after 0 iterations"));
   // ... unless the step is hardly longer than the shortest allowed.
   EXPECT_FALSE(first_steps("time step: 1e-2; min time step: 6e-3; max iterations: 20; tolerance: "
                            "1e-9; max residual: 1e-8;",
@@ -445,6 +448,22 @@ TEST(StepControl, EndsWithoutAShortestStepToo) {
                "strategy: factor, .5, 1, 1.2, 100, 1, 2;"));
   ASSERT_TRUE(run.ready());
   EXPECT_TRUE(run.simulation().step_many(3).error);
+}
+
+TEST(StepControl, RefusesToStandStillOrGoBack) {
+  for (const auto& [length, told] : {std::pair("0.", "0"), {"-1e-9", "-1e-09"}}) {
+    const StepReport report =
+        first_steps("time step: 1e-2; max iterations: 20; strategy: change, const, " +
+                    std::string(length) + ";");
+    ASSERT_TRUE(report.error) << length;
+    EXPECT_THAT(report.error->message,
+                testing::HasSubstr("`strategy: change` asks for a step of " + std::string(told) +
+                                   " s: a step is longer than 0"));
+    EXPECT_FALSE(first_steps("time step: 1e-2; max iterations: 20; min time step: 1e-3; "
+                             "strategy: change, const, " +
+                             std::string(length) + ";")
+                     .error);
+  }
 }
 
 TEST(StepControl, RefusesContradictions) {
