@@ -3,7 +3,7 @@
 ///
 ///     @ joint | joint : <label> , <word> , <grammar> ;        a group and the form of its
 ///     statements clamp                                                   a word
-///       : joint : <grammar> ;                                 where its statements have another form
+///       : gravity : <grammar> ;                               form of its own
 ///       = <node> , [ position , ] { node | <position> }       what stands after it
 ///       > .jnt: F [N] (3)                                     what it writes
 ///       ! partly: without friction                            yes | partly | ignored | no | not

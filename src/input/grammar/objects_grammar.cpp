@@ -239,7 +239,7 @@ uncompressible
 
 @ file driver | file : <label> , <word> , <grammar> ;
 fixed step
-  = { count | 3 } , 1 , initial time , { from file | <t0 [s]> } , time step , { from file | <h [s]> } , [ interpolation , { linear | const } , ] [ { pad zeroes , <yes or no> | bailout , { none | upper | lower | any } } , ] "<samples>"
+  = { count | 3 } , 2 , initial time , { from file | <t0 [s]> } , time step , { from file | <h [s]> } , [ interpolation , { linear | const } , ] [ { pad zeroes , <yes or no> | bailout , { none | upper | lower | any } } , ] "<samples>"
 variable step
   = 1 , [ interpolation , { linear | const } , ] [ { pad zeroes , <yes or no> | bailout , { none | upper | lower | any } } , ] "<samples>"
 stream
