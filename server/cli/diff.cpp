@@ -125,7 +125,7 @@ int diff(const DiffCommand& command) {
                                  b = table_endings(command.second);
   for (const auto& [endings, prefix] : {std::pair(&a, &command.first), {&b, &command.second}})
     if (endings->empty()) {
-      std::fprintf(stderr, "error: there are no results \"%s.*\"\n", prefix->c_str());
+      print_error(no_tables(*prefix), stderr);
       return kRefused;
     }
   Comparison comparison(command);

@@ -17,11 +17,16 @@ Error table_error(ErrorKind kind, std::string message) {
   return make_error(kind, "", std::move(message));
 }
 
+/// "there is no X", and what to do where there is NetCDF; empty where there is not.
+std::string but_netcdf(const std::string& missing, const std::string& prefix) {
+  if (!std::filesystem::exists(prefix + ".nc")) return "";
+  return missing + ", but \"" + prefix + ".nc\": text is read here, which `mbcosim run DECK -o " +
+         prefix + "` writes without `--format netcdf`";
+}
+
 Error cannot_read(const std::string& path, const std::string& prefix) {
-  if (std::filesystem::exists(prefix + ".nc"))
-    return table_error(ErrorKind::io, "there is no \"" + path + "\", but \"" + prefix +
-                                          ".nc\": text is read here, which `mbcosim run DECK -o " +
-                                          prefix + "` writes without `--format netcdf`");
+  if (const std::string netcdf = but_netcdf("there is no \"" + path + '"', prefix); !netcdf.empty())
+    return table_error(ErrorKind::io, netcdf);
   return table_error(ErrorKind::io, "cannot read \"" + path + "\": " + std::strerror(errno) +
                                         "; `mbcosim run DECK -o " + prefix +
                                         "` writes the results of a deck");
@@ -59,6 +64,12 @@ std::vector<std::string> table_endings(const std::string& prefix) {
   }
   std::sort(found.begin(), found.end());
   return found;
+}
+
+Error no_tables(const std::string& prefix) {
+  const std::string none = "there are no results \"" + prefix + ".*\"";
+  const std::string netcdf = but_netcdf(none, prefix);
+  return table_error(ErrorKind::io, netcdf.empty() ? none : netcdf);
 }
 
 Result<ResultTable> read_table(const std::string& prefix, const std::string& ending) {

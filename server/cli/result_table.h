@@ -18,6 +18,9 @@ struct ResultTable {
 /// Endings of the tables among the files PREFIX.*, sorted: "jnt", "mov", …
 std::vector<std::string> table_endings(const std::string& prefix);
 
+/// Why there are none.
+Error no_tables(const std::string& prefix);
+
 /// The table PREFIX.`ending`; ErrorKind::io or argument with the place.
 Result<ResultTable> read_table(const std::string& prefix, const std::string& ending);
 

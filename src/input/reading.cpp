@@ -203,7 +203,10 @@ void Reading::report(Diagnostic d) {
     if (errors_ >= limits.errors) return;
     ++errors_;
   } else if (++warnings_ > kMostWarnings) {
-    return;
+    if (warnings_ > kMostWarnings + 1) return;
+    d.message =
+        "more than " + std::to_string(kMostWarnings) + " warnings: from here on they are not told";
+    d.hint.clear();
   }
   if (d.code.starts_with("limit-")) stopped_ = true;
   diagnostics_.push_back(std::move(d));

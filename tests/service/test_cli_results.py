@@ -113,6 +113,8 @@ def test_plot_of_a_run_without_text_says_what_is_missing(tmp_path):
     (tmp_path / "o").write_text(OSCILLATOR)
     assert mbcosim("run", "o", "-o", "p", "--format", "netcdf", cwd=tmp_path).returncode == 0
     drawn = mbcosim("plot", "p", "--node", 1, "z", cwd=tmp_path)
+    compared = mbcosim("diff", "p", "p", cwd=tmp_path)
+    assert compared.returncode == 4 and 'there are no results "p.*", but "p.nc": text is read here' in compared.stderr
     assert drawn.returncode == 4 and '"p.nc": text is read here, which `mbcosim run DECK -o p` writes without `--format netcdf`' in drawn.stderr
 
 

@@ -57,6 +57,14 @@ TEST(FrozenValue, IsMeantWhereItIsWrittenAsOne) {
     EXPECT_EQ(of_elements("drive caller: 1, " + std::string(drive) + ";"), "") << drive;
 }
 
+TEST(Warnings, SayThatThereAreMore) {
+  const LoadReport report = load("for: integer k = 1, 1500;\nset: integer a = k + .5;\nend for;");
+  ASSERT_TRUE(report.ok());
+  EXPECT_EQ(report.diagnostics.size(), 1001u);
+  EXPECT_EQ(report.diagnostics.back().message,
+            "more than 1000 warnings: from here on they are not told");
+}
+
 TEST(IntegerOverflow, IsNamedWhereItWraps) {
   const auto of = [](const std::string& expression) {
     return findings(load("remark: " + expression + ";").diagnostics);
