@@ -605,6 +605,11 @@ void Stepper::explain(PhaseReport& report, const State& state) {
     remedy =
         "nothing was iterated yet: a load, a law or a drive of what these equations belong to "
         "has no finite value";
+  if (remedy.empty() && !in_step && model_.control.skip_assembly)
+    remedy =
+        "`skip initial joint assembly` leaves nodes where they are given: do positions and "
+        "velocities meet the joints? Without that card they are assembled, or what is "
+        "inconsistent is named";
   if (remedy.empty() && (!in_step || !goes_to_and_fro(history)))
     remedy = remedy_by_units(model_, state);
   if (remedy.empty() && in_step)

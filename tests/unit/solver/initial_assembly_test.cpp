@@ -127,6 +127,17 @@ TEST(InitialAssembly, IsSkippedOnRequest) {
   EXPECT_EQ(run.node(1).x(0), .1);
 }
 
+TEST(InitialAssembly, IsRememberedWhereWhatItWouldDoIsMissing) {
+  std::string text = deck("structural: 1, dynamic, .1,0.,0., eye, null, null;\n",
+                          body(1) + "joint: 1, spherical pin, 1, null, null;\n", 1, 1,
+                          "skip initial joint assembly;");
+  const std::string tolerance = "derivatives tolerance: ";
+  text.replace(text.find(tolerance + "1e6") + tolerance.size(), 3, "1e-4");
+  EXPECT_THAT(failure(text),
+              AllOf(HasSubstr("joint 1 (spherical pin), position constraint"),
+                    HasSubstr("`skip initial joint assembly` leaves nodes where they are given")));
+}
+
 /// The stiffness decides which of two nodes moves more: displacements as 1/k.
 TEST(InitialAssembly, StiffNodesMoveLess) {
   DeckRun run(deck(
