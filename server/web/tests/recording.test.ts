@@ -47,7 +47,7 @@ describe('a recording', () => {
   });
 
   test('keeps within its budget, evenly, with the first and the newest sample', () => {
-    const recording = new Recording(100 * 96);
+    const recording = new Recording(100 * 272);
     for (let step = 0; step < 10_000; ++step) {
       recording.push(sample(step));
       expect(recording.samples.length).toBeLessThanOrEqual(100);
@@ -57,5 +57,17 @@ describe('a recording', () => {
     expect(steps[steps.length - 1]).toBe(9999);
     const gaps = steps.slice(1, -1).map((step, i) => step - steps[i]);
     expect(Math.max(...gaps) / Math.min(...gaps)).toBeLessThanOrEqual(2);
+  });
+
+  test('of hours, with very many small samples, keeps within its budget', () => {
+    const recording = new Recording(), values = new Float64Array(4);
+    let most = 0;
+    for (let step = 0; step < 700_000; ++step) {
+      recording.push({ step, time: step, layout, values });
+      most = Math.max(most, recording.samples.length);
+    }
+    expect(most).toBeLessThan(600_000);
+    const { samples } = recording;
+    expect([samples[0].step, samples[1].step, samples.at(-1)?.step]).toEqual([0, 2, 699_999]);
   });
 });
