@@ -16,7 +16,8 @@ export interface Plot {
   against?: Curve;
 }
 
-const CALM_MILLISECONDS = 100;
+/** A few times a second is so often; what is drawn then has at most such a part of all time. */
+const CALM_MILLISECONDS = 100, CALM_PART = 0.2;
 
 export class Desk {
   readonly shown = new Signal<Shown | undefined>(undefined);
@@ -30,6 +31,7 @@ export class Desk {
   /** A few times a second while something changes: for what is read, not watched. */
   readonly calm = new Signal(0);
   private calmed = true;
+  private calmMilliseconds = CALM_MILLISECONDS;
   private stale = false;
   private unwatch = () => {};
   private nextPlot = 1;
@@ -70,8 +72,10 @@ export class Desk {
     this.calmed = false;
     setTimeout(() => {
       this.calmed = true;
+      const begun = performance.now();
       this.calm.value += 1;
-    }, CALM_MILLISECONDS);
+      this.calmMilliseconds = Math.max(CALM_MILLISECONDS, (performance.now() - begun) / CALM_PART);
+    }, this.calmMilliseconds);
   }
 
   show(shown: Shown | undefined): void {

@@ -5,8 +5,25 @@ export function number(value: number, digits = 5): string {
   if (!Number.isFinite(value)) return Number.isNaN(value) ? '–' : value > 0 ? '∞' : '−∞';
   if (value === 0) return '0';
   const size = Math.abs(value);
-  const text = size >= 1e6 || size < 1e-4 ? value.toExponential(digits - 1) : value.toPrecision(digits);
+  const text = size >= 10 ** Math.max(6, digits) || size < 1e-4 ? value.toExponential(digits - 1) : value.toPrecision(digits);
   return text.replace(/(\.\d*?)0+(e|$)/, '$1$2').replace(/\.(e|$)/, '$1').replaceAll('-', '−');
+}
+
+/** Digits with which numbers up to `largest` that are `increment` apart differ; at least `least`. */
+function digitsOf(largest: number, increment: number, least: number): number {
+  const digits = Math.floor(Math.log10(Math.max(largest, increment))) - Math.floor(Math.log10(increment)) + 2;
+  return Number.isFinite(digits) ? Math.min(Math.max(digits, least), 16) : least;
+}
+
+/** Numbers beside an axis. */
+export function ticks(values: readonly number[], increment: number): string[] {
+  const digits = digitsOf(Math.max(...values.map(Math.abs)), increment, 4);
+  return values.map((value) => number(value, digits));
+}
+
+/** A time; those of steps, `step` apart, differ. */
+export function clock(time: number, step: number): string {
+  return `${number(time, digitsOf(Math.abs(time), step, 6))} s`;
 }
 
 export function seconds(value: number): string {

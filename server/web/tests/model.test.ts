@@ -1,6 +1,6 @@
 import { describe, expect, test } from 'vitest';
 import { evenly, matches, namedIn, otherParts, partOf, shortName, type Model } from '../src/model';
-import { bytes, curveName, number, seconds } from '../src/format';
+import { bytes, clock, curveName, number, seconds, ticks } from '../src/format';
 import { Pace } from '../src/pace';
 import { jointGlyph } from '../src/scene/glyphs';
 import { linesAround, marked } from '../src/panels/diagnostics';
@@ -48,6 +48,18 @@ test('drives stand in the tree, since variables belong to them', () => {
 describe('numbers', () => {
   test.each([[0, '0'], [1.5, '1.5'], [-2, '−2'], [1e-7, '1e−7'], [1234567, '1.2346e+6'], [NaN, '–'], [Infinity, '∞'], [0.1 + 0.2, '0.3'], [100, '100']])('%f is %s', (value, text) => {
     expect(number(value)).toBe(text);
+  });
+
+  test('beside an axis differ, however far from zero they are', () => {
+    expect(ticks([1000.001, 1000.002, 1000.003], 0.001)).toEqual(['1000.001', '1000.002', '1000.003']);
+    expect(ticks([1234567.25, 1234567.5], 0.25)).toEqual(['1234567.25', '1234567.5']);
+    expect(ticks([0, 0.2, 0.4], 0.2)).toEqual(['0', '0.2', '0.4']);
+    expect(ticks([0, 2e-300], 2e-300)).toEqual(['0', '2e−300']);
+    expect(ticks([0, 5e9], 5e9)).toEqual(['0', '5e+9']);
+  });
+
+  test('of time differ from step to step', () => {
+    expect([clock(123456.789, 0.001), clock(1234567.001, 0.001), clock(0.1 + 0.2, 0.01), clock(3e-9, 1e-9), clock(0, 0.1)]).toEqual(['123456.789 s', '1234567.001 s', '0.3 s', '3e−9 s', '0 s']);
   });
 
   test('have the unit that fits', () => {

@@ -1,6 +1,6 @@
 import { describe, expect, test } from 'vitest';
 import type { Curve } from '../src/desk';
-import { columns } from '../src/panels/plots';
+import { alone, columns } from '../src/panels/plots';
 import { Layout, type Sample } from '../src/recording';
 
 const variable = (handle: number) => ({ handle, size: 1, name: `v${handle}` }) as Curve['variable'];
@@ -24,5 +24,29 @@ describe('a curve', () => {
     const many = Array.from({ length: 10_000 }, (_, step) => sample(step, few, step)), [time, values] = columns(many, { id: 1, curves: [first] });
     expect(time.length).toBeLessThan(3500);
     expect([time.at(-1), values.at(-1)]).toEqual([999.9, 9999]);
+  });
+
+  test('of very many samples shows every peak, whatever their pace', () => {
+    const many = Array.from({ length: 72_000 }, (_, step) => sample(step, all, Math.sin((2 * Math.PI * step) / 24), step === 50_001 ? 7 : 0));
+    const [time, wave, once] = columns(many, { id: 1, curves: [first, second] }) as number[][];
+    expect(time.length).toBeLessThan(3500);
+    expect(time).toEqual([...time].sort((one, other) => one - other));
+    for (let i = 0; i + 100 < wave.length; i += 100) {
+      expect(Math.max(...wave.slice(i, i + 100))).toBe(1);
+      expect(Math.min(...wave.slice(i, i + 100))).toBe(-1);
+    }
+    expect(Math.max(...once)).toBe(7);
+  });
+
+  test('from near by has all samples of that time, and those beside it', () => {
+    const many = Array.from({ length: 100_000 }, (_, step) => sample(step, few, step));
+    const [time] = columns(many, { id: 1, curves: [first] }, [500.05, 510]);
+    expect([time.length, time[0], time.at(-1)]).toEqual([102, 500, 510.1]);
+    expect(columns(many, { id: 1, curves: [first] }, [-2, -1])[0]).toEqual([0]);
+  });
+
+  test('has dots where no line joins its points', () => {
+    const data: [number[], ...(number | null)[][]] = [[0, 1, 2, 3, 4], [7, null, 3, 4, null], [null, null, null, null, 1], [1, 2, 3, 4, 5]];
+    expect([1, 2, 3].map((series) => alone({ data }, series))).toEqual([[0], [4], null]);
   });
 });

@@ -2,9 +2,9 @@
 import uPlot from 'uplot';
 import type { Curve, Desk, Plot } from '../desk';
 import { h, iconButton, replace } from '../dom';
-import { curveName, number } from '../format';
+import { curveName, ticks } from '../format';
 import { shortName } from '../model';
-import { valueOf, type Sample } from '../recording';
+import { valueOf, type Layout, type Sample } from '../recording';
 
 /** A point of a curve; null: the sample does not have it. One NaN, and uPlot finds no range for the whole curve. */
 type Value = number | null;
@@ -17,23 +17,68 @@ const COLOURS = {
 const POINTS = 3000;
 const HEIGHT = 150;
 
-/** Columns for a plot: abscissa, then one for each curve. */
-export function columns(samples: readonly Sample[], plot: Plot): Value[][] {
-  const stride = Math.max(1, Math.ceil(samples.length / POINTS));
+/** Times between which a plot shows its curves. */
+type Range = readonly [from: number, to: number];
+
+/** Columns for a plot: abscissa, then one for each curve. Of very many samples those are left out between which no curve has an end or a peak. */
+export function columns(samples: readonly Sample[], plot: Plot, range: Range = [-Infinity, Infinity]): Value[][] {
   const result: Value[][] = [[], ...plot.curves.map(() => [])];
   const at = (sample: Sample, { variable, element }: Curve): Value => {
     const value = valueOf(sample, variable.handle, element);
     return Number.isFinite(value) ? value : null;
   };
-  const add = (sample: Sample) => {
+  for (const sample of plot.against ? evenly(samples) : withPeaks(samples, plot.curves, range)) {
     const abscissa = plot.against ? at(sample, plot.against) : sample.time;
-    if (abscissa === null) return;
+    if (abscissa === null) continue;
     result[0].push(abscissa);
     plot.curves.forEach((curve, k) => result[k + 1].push(at(sample, curve)));
-  };
-  for (let i = 0; i < samples.length; i += stride) add(samples[i]);
-  if (samples.length > 0 && (samples.length - 1) % stride !== 0) add(samples[samples.length - 1]);
+  }
   return result;
+}
+
+/** At most about so many samples as a screen has points, the newest among them. */
+function evenly(samples: readonly Sample[]): readonly Sample[] {
+  const stride = Math.max(1, Math.ceil(samples.length / POINTS));
+  return samples.filter((_, i) => i % stride === 0 || i === samples.length - 1);
+}
+
+/** The same of those between two times and one to each side; of each piece those where a curve is least and greatest. */
+function withPeaks(samples: readonly Sample[], curves: readonly Curve[], [from, to]: Range): readonly Sample[] {
+  const begin = Math.max(firstAfter(samples, from) - 1, 0), end = Math.min(firstAfter(samples, to) + 1, samples.length);
+  const length = Math.ceil(((end - begin) * (2 * curves.length + 1)) / POINTS);
+  if (length <= 2 * curves.length + 1) return samples.slice(begin, end);
+  const shown: Sample[] = [];
+  for (let first = begin; first < end; first += length) {
+    const chosen = new Set([first]), last = Math.min(first + length, end);
+    for (const curve of curves) addPeaks(samples, curve, first, last, chosen);
+    for (const i of [...chosen].sort((one, other) => one - other)) shown.push(samples[i]);
+  }
+  if (shown[shown.length - 1] !== samples[end - 1]) shown.push(samples[end - 1]);
+  return shown;
+}
+
+function addPeaks(samples: readonly Sample[], { variable, element }: Curve, first: number, last: number, chosen: Set<number>): void {
+  let layout: Layout | undefined, at: number | undefined;
+  let least = Infinity, greatest = -Infinity, lowest = first, highest = first;
+  for (let i = first; i < last; ++i) {
+    const sample = samples[i];
+    if (sample.layout !== layout) [layout, at] = [sample.layout, sample.layout.offset(variable.handle)];
+    const value = at === undefined ? NaN : sample.values[at + element];
+    if (value < least) [least, lowest] = [value, i];
+    if (value > greatest) [greatest, highest] = [value, i];
+  }
+  chosen.add(lowest).add(highest);
+}
+
+/** Index of the first sample after a time. */
+function firstAfter(samples: readonly Sample[], time: number): number {
+  let low = 0, high = samples.length;
+  while (low < high) {
+    const middle = (low + high) >> 1;
+    if (samples[middle].time <= time) low = middle + 1;
+    else high = middle;
+  }
+  return low;
 }
 
 function label(curve: Curve): string {
@@ -60,15 +105,26 @@ function pathOf(chart: uPlot, series: number): uPlot.Series.Paths {
   return { stroke };
 }
 
+/** Indices of points that no line shows: those beside them are not known. */
+export function alone(chart: Pick<uPlot, 'data'>, series: number): number[] | null {
+  const values = chart.data[series] as Value[], known = (i: number) => values[i] !== null && values[i] !== undefined;
+  const found = values.flatMap((_, i) => (known(i) && !known(i - 1) && !known(i + 1) ? [i] : []));
+  return found.length > 0 ? found : null;
+}
+
 class PlotView {
   readonly element: HTMLElement;
   private chart?: uPlot;
+  /** Part of the time that is looked at from near by. */
+  private zoomed?: Range;
+  private readonly whole = iconButton('fit', 'All of the time', () => this.zoom(undefined), { class: 'icon-button small hidden' });
   private readonly header = h('header');
   private readonly canvas = h('div', { class: 'canvas' });
+  private readonly resized = new ResizeObserver(() => this.chart?.setSize({ width: this.width(), height: HEIGHT }));
 
   constructor(private readonly desk: Desk, readonly plot: Plot) {
     this.element = h('section', { class: 'plot', 'aria-label': 'Plot' }, this.header, this.canvas);
-    new ResizeObserver(() => this.chart?.setSize({ width: this.width(), height: HEIGHT })).observe(this.canvas);
+    this.resized.observe(this.canvas);
   }
 
   private width(): number {
@@ -84,7 +140,7 @@ class PlotView {
       this.header,
       ...this.plot.curves.map((curve, k) => this.chip(curve, colours[k % colours.length])),
       h('span', { class: 'soft' }, units && `[${units}]`),
-      h('span', { class: 'ends' }, this.abscissa(), iconButton('close', 'Close this plot', () => this.desk.unplot(this.plot), { class: 'icon-button small' })),
+      h('span', { class: 'ends' }, this.whole, this.abscissa(), iconButton('close', 'Close this plot', () => this.desk.unplot(this.plot), { class: 'icon-button small' })),
     );
     const style = getComputedStyle(document.documentElement);
     const axis: uPlot.Axis = {
@@ -93,20 +149,20 @@ class PlotView {
       ticks: { stroke: style.getPropertyValue('--line'), width: 1 },
       font: '11px system-ui',
     };
-    const look = this.plot.curves.map((curve, k) => ({ label: label(curve), stroke: colours[k % colours.length], width: 1.6, points: { show: false } }));
+    const look = this.plot.curves.map((curve, k) => ({ label: label(curve), stroke: colours[k % colours.length], width: 1.6, points: { show: false, ...(!this.plot.against && { size: 6, filter: alone }) } }));
     this.chart = new uPlot(
       {
         width: this.width(),
         height: HEIGHT,
         scales: { x: { time: false } },
         axes: [
-          { ...axis, size: 26, values: (_, ticks) => ticks.map((tick) => number(tick, 4)) },
-          { ...axis, size: 56, values: (_, ticks) => ticks.map((tick) => number(tick, 4)) },
+          { ...axis, size: 26, values: texts, space: (_, __, low, high) => 20 + widthOf(ticks([low, high], (high - low) / 10)) },
+          { ...axis, size: (_, labels) => Math.max(56, 20 + widthOf(labels ?? [])), values: texts },
         ],
-        hooks: { draw: [(chart) => this.drawCursor(chart)] },
+        hooks: { draw: [(chart) => this.drawCursor(chart)], setSelect: [(chart) => this.zoomTo(chart)] },
         ...(this.plot.against
           ? { mode: 2 as const, cursor: { show: false }, series: [{}, ...look.map((one) => ({ ...one, facets: FACETS, paths: pathOf }))] }
-          : { cursor: { drag: { x: true, y: false }, points: { size: 6 } }, series: [{ sorted: 1 as const }, ...look] }),
+          : { cursor: { drag: { x: true, y: false, setScale: false }, bind: { dblclick: () => null }, points: { size: 6 } }, series: [{ sorted: 1 as const }, ...look] }),
       },
       this.data([]),
       this.canvas,
@@ -117,7 +173,7 @@ class PlotView {
 
   /** As uPlot wants it: a table, or points for each curve where the abscissa goes to and fro. */
   private data(samples: readonly Sample[]): uPlot.AlignedData {
-    const [x, ...curves] = columns(samples, this.plot);
+    const [x, ...curves] = columns(samples, this.plot, this.zoomed);
     return (this.plot.against ? [null, ...curves.map((y) => [x, y])] : [x, ...curves]) as uPlot.AlignedData;
   }
 
@@ -142,6 +198,18 @@ class PlotView {
   private goTo(event: MouseEvent): void {
     if (!this.chart || this.plot.against) return;
     this.desk.cursor.value = this.chart.posToVal(event.offsetX, 'x');
+  }
+
+  private zoomTo(chart: uPlot): void {
+    const { left, width } = chart.select;
+    if (width === 0) return;
+    chart.setSelect({ left: 0, top: 0, width: 0, height: 0 }, false);
+    this.zoom([chart.posToVal(left, 'x'), chart.posToVal(left + width, 'x')]);
+  }
+
+  private zoom(range: Range | undefined): void {
+    this.zoomed = range;
+    this.update();
   }
 
   private drawCursor(chart: uPlot): void {
@@ -175,15 +243,34 @@ class PlotView {
   }
 
   update(): void {
-    this.chart?.setData(this.data(this.desk.shown.value?.recording.samples ?? []));
+    const { chart } = this, range = this.plot.against ? undefined : this.zoomed, data = this.data(this.desk.shown.value?.recording.samples ?? []);
+    this.whole.classList.toggle('hidden', range === undefined);
+    chart?.batch(() => {
+      chart.setData(data, range === undefined);
+      if (range) chart.setScale('x', { min: range[0], max: range[1] });
+    });
   }
+
+  end(): void {
+    this.resized.disconnect();
+    this.chart?.destroy();
+  }
+}
+
+const texts: uPlot.Axis.DynamicValues = (_, values, __, ___, increment) => ticks(values, increment);
+
+/** Of the widest of some texts at an axis, about. */
+function widthOf(labels: readonly string[]): number {
+  return 7 * Math.max(...labels.map((text) => text.length), 0);
 }
 
 export function plotsPanel(desk: Desk): HTMLElement {
   const element = h('div', { class: 'plots' });
   let views: PlotView[] = [];
   const rebuild = () => {
-    views = desk.plots.value.map((plot) => views.find((view) => view.plot === plot) ?? new PlotView(desk, plot));
+    const before = views;
+    views = desk.plots.value.map((plot) => before.find((view) => view.plot === plot) ?? new PlotView(desk, plot));
+    before.filter((view) => !views.includes(view)).forEach((view) => view.end());
     element.replaceChildren(...views.map((view) => view.element));
     views.forEach((view) => view.rebuild());
   };

@@ -2,7 +2,7 @@
 import { add, norm, scale, subtract, vec3, type Vec3 } from '../algebra';
 import type { Desk } from '../desk';
 import { h, icon, iconButton } from '../dom';
-import { number } from '../format';
+import { clock, number } from '../format';
 import { pointAt, PoseReader, positionOf, type Pose } from '../geometry';
 import { amplitude, MovedPose, type Mode } from '../modes';
 import { ASKED_FOR, type Layer, type Legend } from '../scene/build';
@@ -154,7 +154,7 @@ export class ScenePanel {
     this.view.setPose(this.pose);
     this.updateOther(sample.time);
     this.view.setTrails([...this.trails].map((node) => this.path(node)));
-    this.hud.replaceChildren(h('strong', {}, `${number(sample.time, 6)} s`), h('div', { class: 'soft' }, `step ${sample.step}`), h('div', { class: 'soft' }, `grid ${number(this.view.cell, 3)}${this.unit(shown)}`),
+    this.hud.replaceChildren(h('strong', {}, clock(sample.time, shown.model.step)), h('div', { class: 'soft' }, `step ${sample.step}`), h('div', { class: 'soft' }, `grid ${number(this.view.cell, 3)}${this.unit(shown)}`),
       ...this.view.legends().map((known) => legend(known, this.unit(shown, known.handle))));
   }
 

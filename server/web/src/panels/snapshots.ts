@@ -1,7 +1,7 @@
 /** Saved states: go back, branch off, forget. */
 import type { Desk } from '../desk';
 import { h, icon, iconButton } from '../dom';
-import { bytes, number } from '../format';
+import { bytes, clock } from '../format';
 import { section } from './section';
 
 export function snapshotsPanel(desk: Desk, open: (simulation: string) => void): HTMLElement {
@@ -23,10 +23,10 @@ export function snapshotsPanel(desk: Desk, open: (simulation: string) => void): 
     panel.classList.toggle('hidden', !session);
     unwatch = session
       ? session.snapshots.watch((snapshots) => list.replaceChildren(...snapshots.map((snapshot) => h('li', { class: 'card' },
-          h('div', { class: 'body' }, h('div', {}, `${number(snapshot.time, 6)} s`), h('div', { class: 'soft' }, `step ${snapshot.step}, ${bytes(Number(snapshot.sizeBytes))}`)),
-          iconButton('restore', `Restore the state at ${number(snapshot.time, 6)} s`, () => void session.restore(snapshot)),
-          iconButton('branch', `Branch off at ${number(snapshot.time, 6)} s`, () => void branch(snapshot)),
-          iconButton('trash', `Delete the state at ${number(snapshot.time, 6)} s`, () => void session.deleteSnapshot(snapshot))))))
+          h('div', { class: 'body' }, h('div', {}, `${clock(snapshot.time, session.model.step)}`), h('div', { class: 'soft' }, `step ${snapshot.step}, ${bytes(Number(snapshot.sizeBytes))}`)),
+          iconButton('restore', `Restore the state at ${clock(snapshot.time, session.model.step)}`, () => void session.restore(snapshot)),
+          iconButton('branch', `Branch off at ${clock(snapshot.time, session.model.step)}`, () => void branch(snapshot)),
+          iconButton('trash', `Delete the state at ${clock(snapshot.time, session.model.step)}`, () => void session.deleteSnapshot(snapshot))))))
       : () => {};
   });
   return panel;

@@ -2,7 +2,7 @@
 import type { Desk } from '../desk';
 import { h, iconButton, icon } from '../dom';
 import { SimulationState } from '../gen/mbcosim/v1/simulations_pb';
-import { number } from '../format';
+import { clock } from '../format';
 
 const SPEEDS = [0.01, 0.1, 0.25, 0.5, 1, 2, 5, 10, Infinity];
 
@@ -123,7 +123,7 @@ export class TimeBar {
     this.play.disabled = session?.info.value.state === SimulationState.FINISHED;
     this.live.setAttribute('aria-pressed', String(this.desk.cursor.value === undefined));
     const sample = this.desk.sample;
-    this.time.textContent = sample ? `${number(sample.time, 6)} s` : '';
+    this.time.textContent = sample ? clock(sample.time, this.desk.shown.value?.model.step ?? 0) : '';
     const first = samples[0]?.time ?? 0, last = samples[samples.length - 1]?.time ?? 0;
     if (sample && document.activeElement !== this.slider) this.slider.value = String(last > first ? (sample.time - first) / (last - first) : 1);
     this.slider.setAttribute('aria-valuetext', this.time.textContent);
