@@ -1081,6 +1081,27 @@ describe('for everybody', () => {
       await page.keyboard.press('Tab');
       await page.keyboard.press('Enter');
       await page.locator('.right .section').first().getByText('body 2').waitFor();
+      const focused = () => page.evaluate(() => document.activeElement?.getAttribute('aria-label') ?? document.activeElement?.textContent);
+      expect(await focused()).toBe('body 2');
+      await page.keyboard.press('Shift+Tab');
+      for (const plots of [3, 0]) {
+        await page.keyboard.press('Enter');
+        expect(await focused()).toBe('Variables of body 2');
+        expect(await page.locator('.tree').getByRole('button', { name: /^Plot body/ }).count()).toBe(plots);
+      }
+      await button(page, 'Save state').press('Enter');
+      await button(page, 'Restore the state at 0 s').press('Enter');
+      await page.getByText('went back to step 0').waitFor({ state: 'attached' });
+      expect(await focused()).toBe('Restore the state at 0 s');
+      await button(page, 'Delete the state at 0 s').press('Enter');
+      await until(page, () => document.activeElement?.matches('.right .list') === true, undefined);
+      await page.locator('summary', { hasText: 'Eigenmodes' }).press('Enter');
+      await button(page, 'Compute').press('Enter');
+      await button(page, 'Hz damping').first().waitFor();
+      expect(await focused()).toBe('Compute');
+      await button(page, 'Hz damping').first().press('Enter');
+      expect(await focused()).toContain('Hz');
+      await page.keyboard.press('Enter');
       await page.keyboard.press('?');
       await page.getByRole('dialog', { name: 'Keys' }).waitFor();
       await page.keyboard.press('Escape');

@@ -20,6 +20,16 @@ export function replace(parent: Element, ...children: Child[]): void {
   parent.replaceChildren(...children.filter((child): child is Node | string => child instanceof Node || typeof child === 'string'));
 }
 
+/** Makes these the children of `parent`. What stays is not touched: it may have the focus, or be pressed. Where what goes had the focus, `parent` gets it. */
+export function arrange(parent: HTMLElement, children: readonly Element[]): void {
+  const staying = new Set(children), focused = parent.contains(document.activeElement);
+  for (const child of [...parent.children]) if (!staying.has(child)) child.remove();
+  children.forEach((child, place) => child !== parent.children[place] && parent.insertBefore(child, parent.children[place] ?? null));
+  if (!focused || parent.contains(document.activeElement)) return;
+  parent.tabIndex = -1;
+  parent.focus();
+}
+
 /** Paths of a 24 × 24 drawing, stroked in the text's colour. */
 const ICONS: Record<string, string> = {
   play: 'M7 5l12 7-12 7z',

@@ -154,9 +154,14 @@ export function shortName(variable: string): string {
   return label < 0 ? variable : words.slice(label + 1).join('.');
 }
 
+/** Of models that were asked about: a large one has a hundred thousand variables. */
+const grouped = new WeakMap<readonly VariableInfo[], Map<string, VariableInfo[]>>();
+
 /** Variables by the part that they belong to. */
-export function variablesByPart(variables: readonly VariableInfo[]): Map<string, VariableInfo[]> {
-  const found = new Map<string, VariableInfo[]>();
+export function variablesByPart(variables: readonly VariableInfo[]): ReadonlyMap<string, VariableInfo[]> {
+  const found = grouped.get(variables) ?? new Map<string, VariableInfo[]>();
+  if (grouped.has(variables)) return found;
+  grouped.set(variables, found);
   for (const variable of variables) {
     const part = partOf(variable.name);
     const list = found.get(part);
@@ -174,6 +179,14 @@ export function partTitle(part: Part): string {
 
 /** Whether every word of `query` is found in `text`, upper and lower case alike. */
 export function matches(text: string, query: string): boolean {
-  const lower = text.toLowerCase();
-  return query.toLowerCase().split(/\s+/).every((word) => lower.includes(word));
+  return finder(query)(text);
+}
+
+/** The same for many texts. */
+export function finder(query: string): (text: string) => boolean {
+  const words = query.toLowerCase().split(/\s+/);
+  return (text) => {
+    const lower = text.toLowerCase();
+    return words.every((word) => lower.includes(word));
+  };
 }

@@ -1,5 +1,5 @@
 import { describe, expect, test } from 'vitest';
-import { evenly, matches, namedIn, otherParts, partOf, shortName, type Model } from '../src/model';
+import { evenly, matches, namedIn, otherParts, partOf, shortName, variablesByPart, type Model } from '../src/model';
 import { bytes, clock, curveName, number, seconds, ticks } from '../src/format';
 import { Pace } from '../src/pace';
 import { jointGlyph } from '../src/scene/glyphs';
@@ -43,6 +43,8 @@ test('drives stand in the tree, since variables belong to them', () => {
   const part = { id: 'joint:7', family: 'joint', type: 'clamp', label: 7, name: '' };
   const model = { nodes: [], elements: [part], variables: ['time', 'joint.7.Fx', 'drive.4.value'].map(variable) } as unknown as Model;
   expect(otherParts(model)).toEqual([{ id: 'drive:4', family: 'drive', type: 'drive caller', label: 4, name: '' }]);
+  expect([...variablesByPart(model.variables).keys()]).toEqual(['', 'joint:7', 'drive:4']);
+  expect(variablesByPart(model.variables)).toBe(variablesByPart(model.variables));  // those of a large model are sorted once
 });
 
 describe('numbers', () => {

@@ -1,7 +1,7 @@
 /** The list of simulations, and where a deck is dropped. */
 import { failureOf, loadDeck, remedy, simulations, type Failure } from '../api';
 import type { Desk } from '../desk';
-import { h, icon, iconButton, rename } from '../dom';
+import { arrange, h, icon, iconButton, rename } from '../dom';
 import { number } from '../format';
 import { SimulationState, type SimulationInfo } from '../gen/mbcosim/v1/simulations_pb';
 import { listSimulations } from '../questions';
@@ -131,7 +131,6 @@ export class Home {
     if (about !== 'connection' || said.innerHTML !== this.message.innerHTML) this.message.replaceChildren(...said.childNodes);  // is read aloud once
   }
 
-  /** What stays in the list stays in its place: it may have the focus, or be pressed. */
   private draw(): void {
     const current = this.desk.session?.name;
     const elements = this.known.map((info) => {
@@ -144,9 +143,9 @@ export class Home {
       return row.element;
     });
     if (elements.length === 0) elements.push(this.none);
-    for (const child of [...this.list.children]) if (!elements.includes(child as HTMLLIElement)) child.remove();
-    elements.forEach((element, place) => element !== this.list.children[place] && this.list.insertBefore(element, this.list.children[place] ?? null));
-    for (const name of this.rows.keys()) if (!this.known.some((info) => info.name === name)) this.rows.delete(name);
+    arrange(this.list, elements);
+    const names = new Set(this.known.map((info) => info.name));
+    for (const name of this.rows.keys()) if (!names.has(name)) this.rows.delete(name);
   }
 
   private row(info: SimulationInfo): Row {

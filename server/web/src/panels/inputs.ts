@@ -2,7 +2,7 @@
 import type { Desk } from '../desk';
 import { h } from '../dom';
 import { curveName, number } from '../format';
-import { matches, partOf, type VariableInfo } from '../model';
+import { finder, partOf, type VariableInfo } from '../model';
 import { valueOf } from '../recording';
 import { section } from './section';
 
@@ -20,8 +20,8 @@ export function inputsPanel(desk: Desk): HTMLElement {
 
   const rebuild = () => {
     shown = [];
-    const all = inputs(), selected = desk.selected.value, query = search.value.trim();
-    const found = all.filter((variable) => (query ? matches(`${variable.name} ${variable.description}`, query) : !selected || partOf(variable.name) === selected));
+    const all = inputs(), selected = desk.selected.value, query = search.value.trim(), matches = finder(query);
+    const found = all.filter((variable) => (query ? matches(`${variable.name} ${variable.description}`) : !selected || partOf(variable.name) === selected));
     const list = found.length > 0 || query ? found : all;
     panel.classList.toggle('hidden', all.length === 0 || !desk.session);
     if (!panel.open) return rows.replaceChildren();

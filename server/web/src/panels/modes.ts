@@ -15,32 +15,40 @@ export function modesPanel(desk: Desk, animate: (mode: Mode | undefined, size: n
   const list = h('ul', { class: 'list' });
   const compute = h('button', { type: 'button', class: 'button', onclick: () => void run() }, icon('wave'), 'Compute');
   const panel = section('Eigenmodes', false, h('div', { class: 'legend' }, count, h('span', { class: 'soft' }, 'nearest to'), near, h('span', { class: 'soft' }, 'Hz'), compute), size, list);
-  let modes: Mode[] = [];
+  let buttons = new Map<Mode, HTMLElement>(), computing = false;
   let shown: Mode | undefined;
 
+  /** The button keeps the focus while it does nothing. */
   const run = async () => {
-    compute.disabled = true;
+    const { session } = desk;
+    if (!session || computing) return;
+    computing = true;
+    compute.setAttribute('aria-disabled', 'true');
     show(undefined);
-    modes = (await desk.session?.eigenmodes(count.valueAsNumber || 10, near.valueAsNumber || 0)) ?? [];
-    compute.disabled = false;
-    draw();
+    const found = await session.eigenmodes(count.valueAsNumber || 10, near.valueAsNumber || 0);
+    computing = false;
+    compute.setAttribute('aria-disabled', 'false');
+    if (session === desk.session) draw(found);
   };
 
   const show = (mode: Mode | undefined) => {
     shown = mode;
     animate(mode, size.valueAsNumber);
-    draw();
+    for (const [other, button] of buttons) {
+      button.classList.toggle('current', other === mode);
+      button.setAttribute('aria-pressed', String(other === mode));
+    }
   };
 
-  const draw = () => {
-    list.replaceChildren(...modes.map((mode) => h('li', {}, h('button', {
-      type: 'button', class: `card${mode === shown ? ' current' : ''}`, 'aria-pressed': String(mode === shown), onclick: () => show(mode === shown ? undefined : mode),
-    }, h('span', { class: 'number' }, `${number(frequency(mode), 5)} Hz`), h('span', { class: 'spacer' }), h('span', { class: 'soft number' }, `damping ${number(Math.abs(damping(mode)) < NO_DAMPING ? 0 : 100 * damping(mode), 3)} %`)))));
+  const draw = (modes: readonly Mode[]) => {
+    buttons = new Map(modes.map((mode) => [mode, h('button', { type: 'button', class: 'card', 'aria-pressed': 'false', onclick: () => show(mode === shown ? undefined : mode) },
+      h('span', { class: 'number' }, `${number(frequency(mode), 5)} Hz`), h('span', { class: 'spacer' }), h('span', { class: 'soft number' }, `damping ${number(Math.abs(damping(mode)) < NO_DAMPING ? 0 : 100 * damping(mode), 3)} %`))]));
+    list.replaceChildren(...[...buttons.values()].map((button) => h('li', {}, button)));
   };
 
   size.addEventListener('input', () => animate(shown, size.valueAsNumber));
   desk.shown.watch(() => {
-    modes = [];
+    draw([]);
     show(undefined);
     panel.classList.toggle('hidden', !desk.session);
   });
