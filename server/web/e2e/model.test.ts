@@ -75,7 +75,7 @@ describe('a flexible body', () => {
     await withPage(browser, 'modal_crane.mbd', async ({ page }) => {
       const still = await flexiblePoints(page);
       await page.locator('summary', { hasText: 'Eigenmodes' }).click();
-      await page.getByRole('spinbutton', { name: 'Nearest to this frequency, in hertz' }).fill('5');
+      await page.getByRole('textbox', { name: 'Nearest to this frequency, in hertz' }).fill('5');
       await page.getByRole('button', { name: 'Compute' }).click();
       const mode = page.getByRole('button', { name: /Hz damping/ }).last();
       await mode.click();

@@ -168,7 +168,7 @@ describe('time', () => {
 
   test('runs until a given time', async () => {
     await withPage(browser, 'pendulum.mbd', async ({ page }, view) => {
-      await page.getByRole('spinbutton', { name: 'Run until, in seconds' }).fill('0.25');
+      await page.getByRole('textbox', { name: 'Run until, in seconds' }).fill('0.25');
       await page.keyboard.press('Enter');
       await atStep(page, 50);
       expect((await view.read([])).time).toBeCloseTo(0.25, 9);
@@ -179,7 +179,7 @@ describe('time', () => {
     await withPage(browser, 'pendulum.mbd', async ({ page }, view) => {
       await button(page, 'Run (space)').click();
       await samplesReach(page, 0.1);
-      await page.getByRole('spinbutton', { name: 'Run until, in seconds' }).fill('4');
+      await page.getByRole('textbox', { name: 'Run until, in seconds' }).fill('4');
       await button(page, 'Run until this time').click();
       await atStep(page, 800);
       await button(page, 'Run (space)').waitFor();
@@ -189,7 +189,7 @@ describe('time', () => {
 
   test('of a run until a given time can be stopped', async () => {
     await withPendulums(400, async ({ page }, view) => {
-      await page.getByRole('spinbutton', { name: 'Run until, in seconds' }).fill('100');
+      await page.getByRole('textbox', { name: 'Run until, in seconds' }).fill('100');
       await button(page, 'Run until this time').click();
       await samplesReach(page, 0.01);
       await page.getByRole('combobox', { name: 'Speed' }).selectOption('0.5');  // is for later
@@ -264,7 +264,7 @@ describe('time', () => {
       await samplesReach(page, stepped.time + 0.005);
       const goal = (await timeOf(view)) + 1;  // is not reached before
       await page.evaluate((goal) => {
-        const field = document.querySelector<HTMLInputElement>('.time input[type=number]') as HTMLInputElement;
+        const field = document.querySelector<HTMLInputElement>('.time input.number') as HTMLInputElement;
         field.value = String(goal);
         field.dispatchEvent(new KeyboardEvent('keydown', { key: 'Enter' }));
       }, goal);
@@ -345,9 +345,12 @@ describe('time', () => {
 describe('on a narrow screen', () => {
   test('all of time is at hand, and nothing is wider than the screen', async () => {
     await withPage(browser, 'pendulum.mbd', async ({ page }) => {
-      await page.getByRole('spinbutton', { name: 'Run until, in seconds' }).fill('0.1');
+      const end = page.getByRole('textbox', { name: 'Run until, in seconds' });
+      await end.fill('0.1');
       await page.getByRole('button', { name: 'Run until this time' }).click();
       await atStep(page, 20);
+      await end.press('Enter');
+      expect(await end.evaluate((element) => (element as HTMLInputElement).validationMessage)).toBe('The simulation has reached this time.');
       for (const name of ['Run (space)', 'One step (S)', '+10', 'live', 'Replay what was recorded, in a loop', 'ortho']) expect(await page.getByRole('button', { name }).isVisible(), name).toBe(true);
       await page.getByRole('combobox', { name: 'Speed' }).selectOption('0.5');
       expect(await page.evaluate(() => document.documentElement.scrollWidth)).toBe(390);
@@ -535,7 +538,32 @@ describe('inputs', () => {
       await page.locator('summary', { hasText: 'Inputs' }).click();
       await page.getByRole('slider', { name: 'stream.force' }).fill('2.5');
       await becomes(view, 'stream.force', [2.5]);
+      const field = page.getByRole('textbox', { name: 'stream.force, value' });
+      for (const [written, value, complaint] of [['1,5', 2.5, '"1,5" is no number.'], ['', 2.5, ''], ['−4e1', -40, '']] as const) {
+        await field.fill(written);
+        await field.press('Enter');
+        expect(await field.evaluate((element) => (element as HTMLInputElement).validationMessage)).toContain(complaint);
+        await field.blur();
+        expect(await field.inputValue()).toBe(String(value));
+        await becomes(view, 'stream.force', [value]);
+        expect(await page.getByRole('slider', { name: 'stream.force' }).inputValue()).toBe(String(value));
+      }
     });
+  });
+
+  test('of more numbers than are shown keep those', async () => {
+    const folder = mkdtempSync(join(tmpdir(), 'mbcosim-')), deck = join(folder, 'cart.mbd');
+    writeFileSync(deck, readFileSync(`${MODELS}/pendulum_cart.mbd`, 'utf8').replace('"force", grpc, 1;', '"force", grpc, 30;'));
+    await withPage(browser, deck, async ({ page }, view) => {
+      const values = Array.from({ length: 30 }, (_, k) => k), { handle } = (await view.variables()).find(({ name }) => name === 'stream.force') ?? {};
+      await view.call('Simulations/WriteVariables', { simulation: view.simulation, values: { handles: [handle], values } });
+      await page.locator('summary', { hasText: 'Inputs' }).click();
+      await samplesHave(page, 'stream.force');
+      await page.getByText('6 more numbers of stream.force are not shown').waitFor();
+      await page.getByRole('slider', { name: 'stream.force.24' }).fill('2.5');
+      await becomes(view, 'stream.force', values.map((value) => (value === 23 ? 2.5 : value)));
+    });
+    rmSync(folder, { recursive: true });
   });
 
   test('are not set back by a sample that arrives before they are sent', async () => {
@@ -553,7 +581,7 @@ describe('inputs while the page runs', () => {
   test('are written between its steps, and it runs on', async () => {
     await withPendulums(200, async ({ page }, view) => {
       await page.locator('summary', { hasText: 'Inputs' }).click();
-      const field = page.getByRole('spinbutton', { name: 'node 1.load.fx, value' });
+      const field = page.getByRole('textbox', { name: 'node 1.load.fx, value' });
       await field.waitFor();
       for (const speed of ['10', 'Infinity']) {
         await page.getByRole('combobox', { name: 'Speed' }).selectOption(speed);

@@ -1,4 +1,5 @@
 /** Elements of the document in one expression each. */
+import { numberOf } from './format';
 
 type Child = Node | string | number | null | undefined | false;
 type Attributes = Record<string, unknown>;
@@ -18,6 +19,26 @@ export function h<K extends keyof HTMLElementTagNameMap>(tag: K, attributes: Att
 
 export function replace(parent: Element, ...children: Child[]): void {
   parent.replaceChildren(...children.filter((child): child is Node | string => child instanceof Node || typeof child === 'string'));
+}
+
+/** A field for a number. (Browsers read "1,5" as 15 where a field has `type="number"`.) */
+export function numberField(attributes: Attributes): HTMLInputElement {
+  const field = h('input', { type: 'text', autocomplete: 'off', spellcheck: 'false', class: 'number', ...attributes });
+  field.addEventListener('input', () => field.setCustomValidity(''));
+  return field;
+}
+
+/** The field's number; NaN: it has none, and says so unless it is empty. */
+export function numberIn(field: HTMLInputElement): number {
+  const { value } = field, found = numberOf(value);
+  if (Number.isNaN(found) && value.trim() !== '') complain(field, `"${value}" is no number. Numbers are written like 1.5 or 2e-3.`);
+  return found;
+}
+
+/** Says at a field what is wrong with it, until it is changed. */
+export function complain(field: HTMLInputElement, what: string): void {
+  field.setCustomValidity(what);
+  field.reportValidity();
 }
 
 /** Makes these the children of `parent`. What stays is not touched: it may have the focus, or be pressed. Where what goes had the focus, `parent` gets it. */

@@ -5,14 +5,14 @@ import type { Geometry } from './geometry';
 import { Layout, Recording, valueOf, type Sample } from './recording';
 import type { Shown } from './session';
 import { Signal } from './signal';
-import { curveName } from './format';
+import { curveName, unitOf } from './format';
 
 /** Samples as a table: time, then all curves of the plots, with names and units in the first line. */
 export function csv(samples: readonly Sample[], plots: readonly Plot[]): string {
   const curves: Curve[] = plots.flatMap((plot) => plot.curves);
   const head = ['step', 'time [s]', ...curves.map(({ variable, element }) => {
     const owner = variable.name.slice(0, variable.name.length - shortName(variable.name).length);
-    return `${owner}${curveName(shortName(variable.name), variable.size, element)}${variable.unit ? ` [${variable.unit}]` : ''}`;
+    return `${owner}${curveName(shortName(variable.name), variable.size, element)}${variable.unit ? ` [${unitOf(variable, element)}]` : ''}`;
   })];
   const quoted = head.map((name) => (/[",\n]/.test(name) ? `"${name.replaceAll('"', '""')}"` : name));
   const rows = samples.map((sample) => [sample.step, sample.time, ...curves.map(({ variable, element }) => valueOf(sample, variable.handle, element))].map((value) => (Number.isNaN(value) ? '' : String(value))).join(','));

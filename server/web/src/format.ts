@@ -9,6 +9,17 @@ export function number(value: number, digits = 5): string {
   return text.replace(/(\.\d*?)0+(e|$)/, '$1$2').replace(/\.(e|$)/, '$1').replaceAll('-', '−');
 }
 
+/** The number that a text says; NaN: none, or it can be read in two ways. */
+export function numberOf(text: string): number {
+  const plain = text.trim().replace('−', '-');
+  return /^[+-]?(\d+\.?\d*|\.\d+)(e[+-]?\d+)?$/i.test(plain) && Number.isFinite(Number(plain)) ? Number(plain) : NaN;
+}
+
+/** A number as a field has it: it can be read again. */
+export function editable(value: number, digits: number): string {
+  return number(value, digits).replaceAll('−', '-');
+}
+
 /** Digits with which numbers up to `largest` that are `increment` apart differ; at least `least`. */
 function digitsOf(largest: number, increment: number, least: number): number {
   const digits = Math.floor(Math.log10(Math.max(largest, increment))) - Math.floor(Math.log10(increment)) + 2;
@@ -51,6 +62,12 @@ const COMPONENTS: Record<number, string[]> = {
 /** "x" for the first of three numbers; "" for a scalar. */
 export function componentName(size: number, element: number): string {
   return size === 1 ? '' : COMPONENTS[size]?.[element] ?? String(element + 1);
+}
+
+/** "N" for a force, "N m" for a moment of "N, N m". */
+export function unitOf({ unit, size }: { unit: string; size: number }, element: number): string {
+  const units = unit.split(', ');
+  return units[Math.floor((element * units.length) / size)];
 }
 
 /** "X.y": the end of a variable's name and the component. */

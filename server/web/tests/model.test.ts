@@ -1,6 +1,6 @@
 import { describe, expect, test } from 'vitest';
 import { evenly, matches, namedIn, otherParts, partOf, shortName, variablesByPart, type Model } from '../src/model';
-import { bytes, clock, curveName, number, seconds, ticks } from '../src/format';
+import { bytes, clock, curveName, editable, number, numberOf, seconds, ticks, unitOf } from '../src/format';
 import { Pace } from '../src/pace';
 import { jointGlyph } from '../src/scene/glyphs';
 import { linesAround, marked } from '../src/panels/diagnostics';
@@ -50,6 +50,19 @@ test('drives stand in the tree, since variables belong to them', () => {
 describe('numbers', () => {
   test.each([[0, '0'], [1.5, '1.5'], [-2, '−2'], [1e-7, '1e−7'], [1234567, '1.2346e+6'], [NaN, '–'], [Infinity, '∞'], [0.1 + 0.2, '0.3'], [100, '100']])('%f is %s', (value, text) => {
     expect(number(value)).toBe(text);
+  });
+
+  test.each([['1.5', 1.5], [' -2e-3 ', -0.002], ['−4', -4], ['.5', 0.5], ['+7.', 7], ['1E3', 1000]])('are read from %s', (text, value) => {
+    expect(numberOf(text)).toBe(value);
+    expect(numberOf(editable(value, 6))).toBe(value);
+  });
+
+  test.each(['1,5', '1 000', '1.5.5', '0x10', '1e400', '', '-', 'abc', 'Infinity'])('are not guessed from "%s"', (text) => expect(numberOf(text)).toBeNaN());
+
+  test('of forces and moments have their own units', () => {
+    const load = { unit: 'N, N m', size: 6 };
+    expect([0, 2, 3, 5].map((element) => unitOf(load, element))).toEqual(['N', 'N', 'N m', 'N m']);
+    expect([unitOf({ unit: 'm', size: 3 }, 2), unitOf({ unit: '', size: 1 }, 0)]).toEqual(['m', '']);
   });
 
   test('beside an axis differ, however far from zero they are', () => {

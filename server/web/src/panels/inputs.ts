@@ -1,12 +1,13 @@
 /** Sliders for what clients may write: loads on nodes, drives of streams, parameters. */
 import type { Desk } from '../desk';
-import { h } from '../dom';
-import { curveName, number } from '../format';
+import { h, numberField, numberIn } from '../dom';
+import { curveName, editable, unitOf } from '../format';
 import { finder, partOf, type VariableInfo } from '../model';
 import { valueOf } from '../recording';
 import { section } from './section';
 
-const MOST = 12;
+/** Variables, and numbers of one of them, that are shown. */
+const MOST = 12, MOST_NUMBERS = 24;
 const WRITE_MILLISECONDS = 40;
 
 export function inputsPanel(desk: Desk): HTMLElement {
@@ -31,7 +32,7 @@ export function inputsPanel(desk: Desk): HTMLElement {
   };
 
   const row = (variable: VariableInfo): HTMLElement => {
-    const count = Math.min(variable.size, 9);
+    const count = Math.min(variable.size, MOST_NUMBERS);
     const values = new Array<number>(variable.size).fill(0);
     const fields: { slider: HTMLInputElement; field: HTMLInputElement }[] = [];
     const unwritten = new Map<number, number>();  // what samples that are on their way do not know yet
@@ -45,37 +46,45 @@ export function inputsPanel(desk: Desk): HTMLElement {
         for (const [place, wanted] of sent) values[place] = wanted;
         await desk.session?.write(variable, [...values]);
         for (const [place, wanted] of sent) if (unwritten.get(place) === wanted) unwritten.delete(place);
+        update();  // what was refused is not there
       }, WRITE_MILLISECONDS);
     };
     const lines = Array.from({ length: count }, (_, k) => {
       const name = curveName(variable.name.replace('node.structural.', 'node '), variable.size, k);
       const slider = h('input', { type: 'range', min: -10, max: 10, step: 'any', 'aria-label': name });
-      const field = h('input', { type: 'number', step: 'any', 'aria-label': `${name}, value` });
+      const field = numberField({ 'aria-label': `${name}, value` });
       slider.addEventListener('input', () => {
-        field.value = number(slider.valueAsNumber, 4).replaceAll('−', '-');
+        field.value = editable(slider.valueAsNumber, 4);
         write(k, slider.valueAsNumber);
       });
       field.addEventListener('change', () => {
-        widen(slider, field.valueAsNumber);
-        slider.value = field.value;
-        write(k, field.valueAsNumber);
+        const value = numberIn(field);
+        if (Number.isNaN(value)) return;
+        widen(slider, value);
+        slider.value = String(value);
+        write(k, value);
+      });
+      field.addEventListener('blur', () => {
+        field.setCustomValidity('');
+        field.value = editable(unwritten.get(k) ?? values[k], 6);
       });
       fields.push({ slider, field });
-      return h('div', { class: 'input' }, h('span', { class: 'label', title: variable.description }, name, ' ', h('span', { class: 'soft' }, variable.unit)), slider, field);
+      return h('div', { class: 'input' }, h('span', { class: 'label', title: variable.description }, name, ' ', h('span', { class: 'soft' }, unitOf(variable, k))), slider, field);
     });
     shown.push({
       variable,
-      set: (next) => next.slice(0, count).forEach((value, k) => {
-        const { slider, field } = fields[k];
+      set: (next) => next.forEach((value, k) => {
         if (unwritten.has(k)) return;
         values[k] = value;
+        if (k >= count) return;
+        const { slider, field } = fields[k];
         if (document.activeElement === slider || document.activeElement === field) return;
         widen(slider, value);
         slider.value = String(value);
-        field.value = number(value, 6).replaceAll('−', '-');
+        field.value = editable(value, 6);
       }),
     });
-    return h('div', {}, ...lines);
+    return h('div', {}, ...lines, count < variable.size ? h('p', { class: 'soft' }, `${variable.size - count} more numbers of ${variable.name} are not shown`) : '');
   };
 
   const update = () => {

@@ -1,6 +1,6 @@
 /** Eigenmodes about the present state: a list to animate. */
 import type { Desk } from '../desk';
-import { h, icon } from '../dom';
+import { h, icon, numberField, numberIn } from '../dom';
 import { number } from '../format';
 import { damping, frequency, type Mode } from '../modes';
 import { section } from './section';
@@ -10,7 +10,7 @@ const NO_DAMPING = 1e-11;
 
 export function modesPanel(desk: Desk, animate: (mode: Mode | undefined, size: number) => void): HTMLElement {
   const count = h('input', { type: 'number', min: 1, max: 200, value: '10', 'aria-label': 'Number of eigenvalues', style: 'width:70px' });
-  const near = h('input', { type: 'number', min: 0, step: 'any', value: '1', 'aria-label': 'Nearest to this frequency, in hertz', style: 'width:70px' });
+  const near = numberField({ inputmode: 'decimal', value: '1', 'aria-label': 'Nearest to this frequency, in hertz', style: 'width:70px' });
   const size = h('input', { type: 'range', min: 0.02, max: 0.5, step: 0.01, value: '0.12', 'aria-label': 'Size of the motion' });
   const list = h('ul', { class: 'list' });
   const compute = h('button', { type: 'button', class: 'button', onclick: () => void run() }, icon('wave'), 'Compute');
@@ -20,12 +20,12 @@ export function modesPanel(desk: Desk, animate: (mode: Mode | undefined, size: n
 
   /** The button keeps the focus while it does nothing. */
   const run = async () => {
-    const { session } = desk;
-    if (!session || computing) return;
+    const { session } = desk, hertz = numberIn(near);
+    if (!session || computing || Number.isNaN(hertz)) return;
     computing = true;
     compute.setAttribute('aria-disabled', 'true');
     show(undefined);
-    const found = await session.eigenmodes(count.valueAsNumber || 10, near.valueAsNumber || 0);
+    const found = await session.eigenmodes(count.valueAsNumber || 10, hertz);
     computing = false;
     compute.setAttribute('aria-disabled', 'false');
     if (session === desk.session) draw(found);

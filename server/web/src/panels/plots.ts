@@ -2,7 +2,7 @@
 import uPlot from 'uplot';
 import type { Curve, Desk, Plot } from '../desk';
 import { h, iconButton, replace } from '../dom';
-import { curveName, ticks } from '../format';
+import { curveName, ticks, unitOf } from '../format';
 import { shortName } from '../model';
 import { valueOf, type Layout, type Sample } from '../recording';
 
@@ -135,7 +135,7 @@ class PlotView {
   rebuild(): void {
     this.chart?.destroy();
     const colours = COLOURS[this.desk.theme.value];
-    const units = [...new Set(this.plot.curves.map((curve) => curve.variable.unit))].filter(Boolean).join(', ');
+    const units = [...new Set(this.plot.curves.map(({ variable, element }) => unitOf(variable, element)))].filter(Boolean).join(', ');
     replace(
       this.header,
       ...this.plot.curves.map((curve, k) => this.chip(curve, colours[k % colours.length])),

@@ -1,6 +1,6 @@
 /** Time: run, pause, step, run until; and what was recorded, as a slider. */
 import type { Desk } from '../desk';
-import { h, iconButton, icon } from '../dom';
+import { complain, h, iconButton, icon, numberField, numberIn } from '../dom';
 import { SimulationState } from '../gen/mbcosim/v1/simulations_pb';
 import { clock } from '../format';
 
@@ -12,7 +12,7 @@ export class TimeBar {
   private readonly live = h('button', { type: 'button', class: 'button live', 'aria-pressed': 'true', onclick: () => this.goLive() }, 'live');
   private readonly slider = h('input', { type: 'range', min: 0, max: 1, step: 'any', value: 1, 'aria-label': 'Time looked at' });
   private readonly time = h('output', { 'aria-label': 'Time' });
-  private readonly until = h('input', { type: 'number', step: 'any', placeholder: 'until [s]', 'aria-label': 'Run until, in seconds' });
+  private readonly until = numberField({ placeholder: 'until [s]', inputmode: 'decimal', 'aria-label': 'Run until, in seconds' });
   private readonly speed = h('select', { 'aria-label': 'Speed' }, ...SPEEDS.map((speed) => h('option', { value: speed }, Number.isFinite(speed) ? `${speed} ×` : 'full speed')));
   private readonly loop: HTMLButtonElement;
   private readonly controls: HTMLElement[];
@@ -66,10 +66,11 @@ export class TimeBar {
   }
 
   private runUntil(): void {
-    const time = this.until.valueAsNumber;
-    if (!Number.isFinite(time)) return this.until.focus();
+    const time = numberIn(this.until), session = this.desk.session;
+    if (Number.isNaN(time)) return this.until.focus();
+    if (session && time <= session.info.value.time) return complain(this.until, 'The simulation has reached this time.');
     this.goLive();
-    void this.desk.session?.runUntil(time);
+    void session?.runUntil(time);
   }
 
   private look(): void {
