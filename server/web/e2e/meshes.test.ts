@@ -120,7 +120,8 @@ describe('the meshes of a sidecar', () => {
 
   test('come with a deck from the disk', async () => {
     await withPage(browser, 'pendulum.mbd', async ({ page }, view) => {
-      await page.evaluate(() => (document.querySelector('.empty') as HTMLElement).classList.remove('hidden'));
+      await page.getByRole('tab', { name: 'Simulations' }).click();
+      await page.getByRole('button', { name: 'Load a deck' }).click();
       await page.getByLabel('Files of a deck').setInputFiles(['slider_crank.mbd', 'slider_crank.view.json', 'slider_crank_crank.obj', 'slider_crank_rod.obj', 'slider_crank_piston.obj'].map((name) => `${MODELS}/${name}`));
       await until(page, (name) => location.hash.includes('simulation=') && !location.hash.includes(encodeURIComponent(name)), view.simulation);
       await shown(page);

@@ -15,6 +15,11 @@ beforeAll(async () => {
 afterAll(() => browser?.close());
 
 const button = (page: Page, name: string) => page.getByRole('button', { name });
+async function askForDeck(page: Page): Promise<void> {
+  await page.getByRole('tab', { name: 'Simulations' }).click();
+  await button(page, 'Load a deck').click();
+}
+
 const timeOf = async (view: View) => (await view.read([])).time;
 
 /** Do the scene's node matrices equal what the service reads? */
@@ -769,7 +774,7 @@ describe('solver and events', () => {
 describe('a deck from the disk', () => {
   test('is loaded with the files that it includes, once it is chosen, though the connection is lost meanwhile', async () => {
     await withPage(browser, 'pendulum.mbd', async ({ page, faults }, view) => {
-      await page.evaluate(() => (document.querySelector('.empty') as HTMLElement).classList.remove('hidden'));
+      await askForDeck(page);
       const lists = '**/mbcosim.v1.Simulations/ListSimulations', listed = () => page.waitForResponse(lists);
       const lose = async () => {
         const lost = new Promise<void>((resolve) => void page.route(lists, (route) => route.abort('connectionreset').then(resolve)));
@@ -798,7 +803,7 @@ describe('a deck from the disk', () => {
     await withPage(browser, 'pendulum.mbd', async (visited) => {
       const { page } = visited;
       const text = readFileSync(`${MODELS}/pendulum.mbd`, 'utf8').replaceAll('spherical hinge', 'sperical hinge');
-      await page.evaluate(() => (document.querySelector('.empty') as HTMLElement).classList.remove('hidden'));
+      await askForDeck(page);
       await page.getByLabel('Files of a deck').setInputFiles({ name: 'bad.mbd', mimeType: 'text/plain', buffer: Buffer.from(text) });
       await page.getByText('unknown joint type "spericalhinge"').last().waitFor();
       expect(await page.locator('.diagnostic mark').textContent()).toBe('sperical hinge');
@@ -811,9 +816,15 @@ describe('a deck from the disk', () => {
 
   test('that is no deck is refused before it is sent', async () => {
     await withPage(browser, 'pendulum.mbd', async ({ page }) => {
-      await page.evaluate(() => (document.querySelector('.empty') as HTMLElement).classList.remove('hidden'));
+      await askForDeck(page);
       await page.getByLabel('Files of a deck').setInputFiles({ name: 'notes.txt', mimeType: 'text/plain', buffer: Buffer.from('no deck') });
-      await page.getByText('None of these files is a deck').waitFor();
+      const refused = page.getByText('None of these files is a deck');
+      await refused.waitFor();
+      await button(page, 'Back to the simulation').click();
+      expect(await refused.isVisible()).toBe(false);
+      await askForDeck(page);
+      expect(await refused.count()).toBe(0);
+      expect(await page.getByLabel('Files of a deck').inputValue()).toBe('');  // the same file may be chosen again
     });
   });
 });
@@ -918,6 +929,11 @@ describe('a daemon that is started again', () => {
       await page.getByText('The daemon does not answer; trying again.').waitFor();
       await daemon.start();
       await page.getByText('The daemon does not know this simulation any more.').waitFor();
+      for (const name of ['One step (S)', 'Run until this time', 'Save state', 'Branch off here']) expect(await button(page, name).isVisible(), name).toBe(false);
+      await page.keyboard.press('b');
+      await page.getByText('The daemon does not know this simulation any more.').waitFor();
+      await button(page, 'Play (space)').click();
+      await button(page, 'Pause (space)').click();
       const second = await create(daemon, 'heavy_top.mbd');
       await page.getByRole('tab', { name: 'Simulations' }).click();
       await page.getByRole('button', { name: 'heavy_top.mbd' }).first().click();
@@ -1093,7 +1109,7 @@ describe('for everybody', () => {
       expect(await seriousFaults(visited)).toEqual([]);
       await page.keyboard.press('Escape');
       await page.getByRole('tab', { name: 'Simulations' }).click();
-      await page.evaluate(() => (document.querySelector('.empty') as HTMLElement).classList.remove('hidden'));
+      await askForDeck(page);
       await page.getByLabel('Files of a deck').setInputFiles({ name: 'bad.mbd', mimeType: 'text/plain', buffer: Buffer.from('begin: data;\n  problem: nonsense;\nend: data;\n') });
       await page.locator('.diagnostic mark').first().waitFor();
       expect(await seriousFaults(visited)).toEqual([]);

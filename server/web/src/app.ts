@@ -60,6 +60,7 @@ export class App {
     const wanted = new URLSearchParams(location.hash.slice(1)).get('simulation');
     const name = wanted ?? (known.length === 1 ? known[0].name : undefined);
     if (name) await this.open(name);
+    else if (known.length > 0) this.tab('model');  // where the screen is narrow the list is in there
     void this.home.follow();
     window.addEventListener('hashchange', () => {
       const next = new URLSearchParams(location.hash.slice(1)).get('simulation');
@@ -117,7 +118,11 @@ export class App {
   private fillLeft(): void {
     const tree = treePanel(this.desk);
     if (this.recorded) return this.left.replaceChildren(tree);
-    const list = h('div', { class: 'pane hidden' }, this.home.list);
+    const ask = () => {
+      this.home.askForDeck();
+      this.tab('scene');
+    };
+    const list = h('div', { class: 'pane hidden' }, h('div', { class: 'search' }, h('button', { type: 'button', class: 'button', onclick: ask }, icon('upload'), 'Load a deck')), this.home.list);
     const tabs: [HTMLButtonElement, HTMLElement][] = [
       [h('button', { type: 'button', role: 'tab', 'aria-selected': 'true' }, 'Model'), tree],
       [h('button', { type: 'button', role: 'tab', 'aria-selected': 'false' }, 'Simulations'), list],
@@ -139,12 +144,13 @@ export class App {
   }
 
   private right(): HTMLElement {
+    const acting = (panel: HTMLElement) => (panel.classList.add('acting'), panel);
     return h('aside', { class: 'right', 'aria-label': 'Panels' },
       selectionPanel(this.desk, this.scene),
-      inputsPanel(this.desk),
-      snapshotsPanel(this.desk, (name) => void this.open(name)),
+      acting(inputsPanel(this.desk)),
+      acting(snapshotsPanel(this.desk, (name) => void this.open(name))),
       solverPanel(this.desk),
-      modesPanel(this.desk, (mode, size) => this.scene.animate(mode, size)),
+      acting(modesPanel(this.desk, (mode, size) => this.scene.animate(mode, size))),
       logPanel(this.desk));
   }
 
@@ -179,6 +185,8 @@ export class App {
 
   private updateState(): void {
     const session = this.desk.session, title = this.desk.shown.value?.title;
+    this.shell.classList.toggle('nothing', title === undefined);
+    this.shell.classList.toggle('gone', !this.desk.alive);
     if (this.name.textContent !== (title ?? '')) this.name.textContent = title ?? '';
     document.title = title === undefined ? 'mbcosim' : `${title} – mbcosim`;
     this.chip.classList.toggle('hidden', !this.desk.shown.value);
@@ -253,7 +261,7 @@ export class App {
       ArrowLeft: () => this.time.nudge(-1),
       ArrowRight: () => this.time.nudge(1),
       l: () => this.time.goLive(),
-      b: () => void this.desk.session?.saveSnapshot(''),
+      b: () => void this.desk.alive?.saveSnapshot(''),
       '/': () => this.shell.querySelector<HTMLInputElement>('.search input')?.focus(),
       f: () => press('F'),
       t: () => this.scene.toggleTrail(),

@@ -49,6 +49,11 @@ export class Desk {
     return this.shown.value instanceof Session ? this.shown.value : undefined;
   }
 
+  /** The simulation on show, as long as something can be done with it. */
+  get alive(): Session | undefined {
+    return this.session?.gone.value ? undefined : this.session;
+  }
+
   /** The sample at the time looked at. */
   get sample(): Sample | undefined {
     const recording = this.shown.value?.recording;

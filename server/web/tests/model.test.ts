@@ -116,8 +116,8 @@ test('a mark in a line counts bytes, not letters', () => {
 });
 
 test('lines around a place are those of the deck, as far as there are any', () => {
-  expect(linesAround('a\r\nb\nc\nd\ne\nf', 2)).toEqual({ before: [[1, 'a']], after: [[3, 'c'], [4, 'd'], [5, 'e']] });
-  expect(linesAround('a\nb', 2)).toEqual({ before: [[1, 'a']], after: [] });
+  expect(linesAround(['a', 'b', 'c', 'd', 'e', 'f'], 2)).toEqual({ before: [[1, 'a']], after: [[3, 'c'], [4, 'd'], [5, 'e']] });
+  expect(linesAround(['a', 'b'], 2)).toEqual({ before: [[1, 'a']], after: [] });
 });
 
 test('the parts of the wall time sum to one', () => {

@@ -15,29 +15,34 @@ export function marked(line: string, column: number, length: number): [string, s
   return [text(0, from), text(from, to), text(to, bytes.length)];
 }
 
-/** Lines around line `line` (from 1) of a text, with their numbers. */
-export function linesAround(text: string, line: number): { before: [number, string][]; after: [number, string][] } {
-  const numbered = text.split(/\r?\n/).map((words, i): [number, string] => [i + 1, words]);
-  return { before: numbered.slice(Math.max(line - 1 - AROUND, 0), line - 1), after: numbered.slice(line, line + AROUND) };
+/** Lines around line `line` (from 1), with their numbers. */
+export function linesAround(lines: readonly string[], line: number): { before: [number, string][]; after: [number, string][] } {
+  const numbered = (from: number, to: number) => lines.slice(from, to).map((words, i): [number, string] => [from + i + 1, words]);
+  return { before: numbered(Math.max(line - 1 - AROUND, 0), line - 1), after: numbered(line, line + AROUND) };
 }
 
 /** `files`: those of the deck, where the page has them. */
 export function diagnosticsList(diagnostics: readonly Diagnostic[], files: readonly NamedFile[] = []): HTMLElement {
-  const texts = new Map(files.map(({ path, data }) => [path, data]));
+  const texts = new Map(files.map(({ path, data }) => [path, data])), split = new Map<string, string[]>();
+  const linesOf = (file: string): string[] => {
+    const lines = split.get(file) ?? new TextDecoder().decode(texts.get(file)).split(/\r?\n/);
+    split.set(file, lines);
+    return lines;
+  };
   return h('div', { class: 'diagnostics' }, ...diagnostics.map((diagnostic) => {
     const name = NAMES[diagnostic.severity] ?? 'note';
     const { file, line = 0, column = 0 } = diagnostic;
     return h('article', { class: `diagnostic ${name}` },
       h('div', {}, h('strong', {}, line > 0 ? `${file}:${line}:${column}: ` : ''), `${name}: ${diagnostic.message}`),
-      diagnostic.sourceLine ? deckText(diagnostic, line, column, texts.get(file)) : null,
+      diagnostic.sourceLine ? deckText(diagnostic, line, column, texts.has(file) ? linesOf(file) : []) : null,
       diagnostic.hint ? h('p', {}, h('em', {}, 'hint: '), diagnostic.hint) : null,
       ...diagnostic.trail.map((step) => h('p', { class: 'soft' }, step)));
   }));
 }
 
-function deckText(diagnostic: Diagnostic, line: number, column: number, data: Uint8Array | undefined): HTMLElement {
+function deckText(diagnostic: Diagnostic, line: number, column: number, lines: readonly string[]): HTMLElement {
   const [before, at, after] = marked(diagnostic.sourceLine, column, diagnostic.length);
-  const around = data ? linesAround(new TextDecoder().decode(data), line) : { before: [], after: [] };
+  const around = linesAround(lines, line);
   const row = (number: number, ...words: (Node | string)[]) => h('div', { class: 'line' }, h('span', { class: 'soft', 'aria-hidden': 'true' }, String(number)), h('code', {}, ...words));
   return h('pre', { tabindex: 0, 'aria-label': `Line ${line} of ${diagnostic.file}` },
     ...around.before.map(([number, words]) => row(number, words)),

@@ -37,6 +37,7 @@ export class Home {
   /** What stands in place of the scene while nothing is shown. */
   readonly welcome = h('div', { class: 'empty' });
   private readonly message = h('div', { 'aria-live': 'polite' });
+  private readonly back = h('button', { type: 'button', class: 'button', onclick: () => this.welcome.classList.add('hidden') }, 'Back to the simulation');
   private about: About = 'nothing';
   private readonly none = h('li', { class: 'soft' }, 'No simulation yet.');
   private readonly rows = new Map<string, Row>();
@@ -47,17 +48,21 @@ export class Home {
       h('h1', {}, 'See it move'),
       h('p', { class: 'soft' }, 'Choose a simulation of this daemon, or bring a deck of your own.'),
       h('div', { class: 'drop' }, icon('upload'), h('p', {}, 'Drop a deck here, with the files that it includes, or its folder.'), this.chooser()),
-      this.message));
+      this.back, this.message));
     this.acceptDrops();
     desk.shown.watch((shown) => {
       this.welcome.classList.toggle('hidden', shown !== undefined);
+      this.back.classList.toggle('hidden', shown === undefined);
       this.draw();
     });
   }
 
   private chooser(): HTMLElement {
     const input = h('input', { type: 'file', multiple: true, class: 'visually-hidden', tabindex: -1, 'aria-label': 'Files of a deck' });
-    input.addEventListener('change', () => void chosenFiles(input.files as FileList).then((files) => this.load(files)));
+    input.addEventListener('change', () => {
+      void this.take(chosenFiles(input.files as FileList));
+      input.value = '';  // the same files may be chosen again when they have changed
+    });
     return h('div', {}, h('button', { type: 'button', class: 'button primary', onclick: () => input.click() }, 'Choose files'), input);
   }
 
@@ -70,8 +75,25 @@ export class Home {
     document.addEventListener('drop', (event) => {
       event.preventDefault();
       document.body.classList.remove('dropping');
-      if (event.dataTransfer) void droppedFiles(event.dataTransfer).then((files) => this.load(files));
+      if (event.dataTransfer) void this.take(droppedFiles(event.dataTransfer));
     });
+  }
+
+  /** Asks for a deck, whatever is on show. */
+  askForDeck(): void {
+    this.say('nothing');
+    this.welcome.classList.remove('hidden');
+    this.welcome.querySelector('button')?.focus();
+  }
+
+  /** What is dropped may be no file. */
+  private async take(reading: Promise<NamedFile[]>): Promise<void> {
+    try {
+      const files = await reading;
+      if (files.length > 0) await this.load(files);
+    } catch (thrown) {
+      this.tell(failureOf(thrown));
+    }
   }
 
   /** Loads a deck; where several files can be the main one, the reader says which. */
@@ -122,9 +144,7 @@ export class Home {
   tell(failure: Failure, files: readonly NamedFile[] = [], about: About = failure.diagnostics.length > 0 ? 'deck' : 'failure'): void {
     const hint = remedy(failure);
     if (about !== 'connection' || !this.desk.shown.value) this.welcome.classList.remove('hidden');
-    const back = h('button', { type: 'button', class: 'button', onclick: () => this.welcome.classList.add('hidden') }, 'Back to the simulation');
     const said = h('div', {},
-      this.desk.shown.value ? back : '',
       failure.diagnostics.length === 0 ? h('div', { class: 'diagnostic' }, h('strong', {}, failure.message), hint && h('p', {}, hint)) : '',
       diagnosticsList(failure.diagnostics, files));
     this.about = about;

@@ -13,6 +13,7 @@ export function logPanel(desk: Desk): HTMLElement {
   /** What stays is not touched: it may be selected, and is read aloud once. */
   const draw = () => {
     stale = false;
+    const atEnd = list.scrollHeight - list.scrollTop - list.clientHeight < 4;  // otherwise somebody reads what was before
     const entries = new Set(desk.session?.log.value);
     for (const [entry, row] of rows) {
       if (entries.has(entry)) continue;
@@ -21,11 +22,11 @@ export function logPanel(desk: Desk): HTMLElement {
     }
     for (const entry of entries) {
       if (rows.has(entry)) continue;
-      const row = h('div', { class: entry.level }, h('span', { class: 'soft' }, entry.wall.toLocaleTimeString()), ' ', entry.text);
+      const row = h('div', { class: entry.level }, h('span', { class: 'soft' }, moment(entry.wall)), ' ', entry.text);
       rows.set(entry, row);
       list.append(row);
     }
-    list.scrollTop = list.scrollHeight;
+    if (atEnd) list.scrollTop = list.scrollHeight;
   };
 
   desk.shown.watch(() => {
@@ -37,4 +38,9 @@ export function logPanel(desk: Desk): HTMLElement {
     }) ?? (() => {});
   });
   return panel;
+}
+
+/** Time of day; with its date where that was another day. */
+export function moment(wall: Date, now = new Date()): string {
+  return wall.toDateString() === now.toDateString() ? wall.toLocaleTimeString() : wall.toLocaleString();
 }

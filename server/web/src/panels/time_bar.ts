@@ -27,7 +27,7 @@ export class TimeBar {
     const ten = h('button', { type: 'button', class: 'button', title: 'Ten steps', onclick: () => this.step(10) }, '+10');
     const run = iconButton('until', 'Run until this time', () => this.runUntil());
     this.speed.value = '1';
-    this.speed.addEventListener('change', () => desk.session?.setSpeed(Number(this.speed.value)));
+    this.speed.addEventListener('change', () => desk.alive?.setSpeed(Number(this.speed.value)));
     this.slider.addEventListener('input', () => this.look());
     this.until.addEventListener('keydown', (event) => event.key === 'Enter' && this.runUntil());
     this.controls = [this.play, step, ten, this.until, run, this.speed, this.live];
@@ -39,7 +39,7 @@ export class TimeBar {
   }
 
   toggle(): void {
-    const session = this.desk.session;
+    const session = this.desk.alive;
     if (!session) return this.toggleLoop();
     this.goLive();
     if (session.playing.value === 'no') session.play();
@@ -48,7 +48,7 @@ export class TimeBar {
 
   step(count: number): void {
     this.goLive();
-    void this.desk.session?.step(count);
+    void this.desk.alive?.step(count);
   }
 
   /** Looks one recorded sample back or on. */
@@ -66,7 +66,7 @@ export class TimeBar {
   }
 
   private runUntil(): void {
-    const time = numberIn(this.until), session = this.desk.session;
+    const time = numberIn(this.until), session = this.desk.alive;
     if (Number.isNaN(time)) return this.until.focus();
     if (session && time <= session.info.value.time) return complain(this.until, 'The simulation has reached this time.');
     this.goLive();
@@ -106,14 +106,19 @@ export class TimeBar {
     this.unwatch.forEach((end) => end());
     this.replaying = false;
     const session = this.desk.session;
-    for (const control of this.controls) control.classList.toggle('hidden', !session && control !== this.speed && control !== this.play);
-    this.unwatch = session ? [session.playing.watch(() => this.update()), session.info.watch(() => this.update())] : [];
+    this.unwatch = session ? [session.playing.watch(() => this.update()), session.info.watch(() => this.update()), session.gone.watch(() => this.offer())] : [];
+    this.offer();
     if (session) this.speed.value = String(session.speed.value);
+  }
+
+  /** Without a simulation that can be advanced, what was recorded can be played. */
+  private offer(): void {
+    for (const control of this.controls) control.classList.toggle('hidden', !this.desk.alive && control !== this.speed && control !== this.play);
     this.update();
   }
 
   private update(): void {
-    const session = this.desk.session, samples = this.desk.shown.value?.recording.samples ?? [];
+    const session = this.desk.alive, samples = this.desk.shown.value?.recording.samples ?? [];
     const running = session ? session.playing.value !== 'no' : this.replaying;
     const label = running ? 'Pause (space)' : session ? 'Run (space)' : 'Play (space)';
     if (this.play.title !== label) {
