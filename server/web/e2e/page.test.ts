@@ -967,7 +967,12 @@ describe('a daemon that keeps its simulations', () => {
       await atStep(page, 10);
       const before = await scene(page);
       await end(daemon);
-      await page.getByText('The daemon does not answer; trying again.').waitFor();
+      const lost = page.getByText('The daemon does not answer; trying again.');
+      await lost.waitFor();
+      await page.keyboard.press('s');  // is lost, too, and nothing is said of it when the daemon answers again
+      await page.locator('.log').getByText('the daemon does not answer').first().waitFor({ state: 'attached' });
+      await rested(page);
+      expect(await lost.isVisible()).toBe(true);
       await daemon.start();
       if (reload) await page.reload();
       else await until(page, () => document.querySelector('.banner')?.classList.contains('hidden') === true, undefined);
@@ -1093,6 +1098,11 @@ describe('for everybody', () => {
       if (!options.width) {
         await openAll(visited);
         expect(await seriousFaults(visited)).toEqual([]);
+        await button(visited.page, '+10').click();
+        await atStep(visited.page, 10);
+        await visited.page.getByRole('button', { name: 'dynamic node 101', exact: true }).click();
+        await until(visited.page, () => document.querySelector('.numbers.matrix')?.textContent?.includes('e−') === true, undefined);
+        expect(await visited.page.evaluate(() => document.querySelector('.right')?.scrollWidth)).toBe(await visited.page.evaluate(() => document.querySelector('.right')?.clientWidth));
       }
       for (const tab of options.width ? ['Model', 'Plots', 'Panels'] : []) {
         await visited.page.getByRole('tab', { name: tab, exact: true }).last().click();

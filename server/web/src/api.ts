@@ -7,7 +7,7 @@ import { Events } from './gen/mbcosim/v1/events_pb';
 import { Geometry } from './gen/mbcosim/v1/geometry_pb';
 import { Simulations } from './gen/mbcosim/v1/simulations_pb';
 import { Telemetry } from './gen/mbcosim/v1/telemetry_pb';
-import { newRequestId, repeatable } from './requests';
+import { isLost, newRequestId, repeatable } from './requests';
 import { chunks, type NamedFile } from './upload';
 
 const { origin = '', pathname = '' } = globalThis.location ?? {};
@@ -34,6 +34,8 @@ export interface Failure {
   diagnostics: Diagnostic[];
   solver?: SolverFailure;
   cancelled: boolean;
+  /** Nothing is wrong but that the daemon could not be asked: over when it answers again. */
+  passing?: boolean;
 }
 
 /** The detail of this type, whose bytes are those of `google.rpc.ErrorInfo` too. */
@@ -50,13 +52,14 @@ export function remedy(failure: Failure): string {
 
 export function failureOf(thrown: unknown): Failure {
   const error = ConnectError.from(thrown);
-  const info = errorInfo(error);
+  const info = errorInfo(error), lost = isLost(thrown);
   return {
-    message: error.rawMessage || 'the daemon does not answer',
+    message: (!lost && error.rawMessage) || 'the daemon does not answer',
     reason: info?.reason ?? (error.code === Code.Unauthenticated ? 'UNAUTHENTICATED' : ''),
     metadata: info?.metadata ?? {},
     diagnostics: error.findDetails(DeckDiagnosticsSchema)[0]?.diagnostics ?? [],
     solver: error.findDetails(SolverFailureSchema)[0],
     cancelled: error.code === Code.Canceled,
+    passing: lost || error.code === Code.Unavailable,
   };
 }

@@ -17,7 +17,7 @@ interface Identified {
 }
 
 /** Did the request go out without a reply that could be read? */
-function isLost(thrown: unknown): boolean {
+export function isLost(thrown: unknown): boolean {
   return thrown instanceof TypeError || (thrown instanceof ConnectError && thrown.cause instanceof TypeError);
 }
 

@@ -254,6 +254,7 @@ export class Session implements Shown {
         await this.refresh();
         if (this.lost.value || this.behind()) await this.read();
         this.lost.value = '';
+        if (this.failure.value?.passing) this.failure.value = undefined;
       } catch (thrown) {
         const failure = failureOf(thrown);
         if (failure.cancelled) continue;
