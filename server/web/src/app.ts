@@ -2,7 +2,7 @@
 import { failureOf } from './api';
 import { Desk } from './desk';
 import { download, h, icon, iconButton } from './dom';
-import { csv, recordingPage } from './export';
+import { csv, fileName, recordingPage } from './export';
 import { Home, STATES } from './panels/home';
 import { inputsPanel } from './panels/inputs';
 import { logPanel } from './panels/log';
@@ -230,7 +230,7 @@ export class App {
   // ---- export
 
   private fileName(ending: string): string {
-    return `${(this.desk.shown.value?.title ?? 'mbcosim').replace(/[^\w.-]+/g, '_')}.${ending}`;
+    return fileName(this.desk.shown.value?.title ?? 'mbcosim', ending);
   }
 
   private async savePicture(): Promise<void> {

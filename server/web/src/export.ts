@@ -19,7 +19,12 @@ export function csv(samples: readonly Sample[], plots: readonly Plot[]): string 
   return [quoted.join(','), ...rows].join('\n') + '\n';
 }
 
-/** What a recording holds, as JSON. Numbers of samples are 32-bit floats in base64: pictures need no more. */
+/** Name of a file with what is shown under a title. */
+export function fileName(title: string, ending: string): string {
+  return `${title.replace(/[^\p{L}\p{N}_.-]+/gu, '_')}.${ending}`;
+}
+
+/** What a recording holds, as JSON. Numbers of samples are in base64, and no less exact than they were: tables are made of them. */
 interface Stored {
   format: 'mbcosim-recording-1';
   title: string;
@@ -28,30 +33,35 @@ interface Stored {
   layout: { handle: number; size: number }[];
   steps: number[];
   times: number[];
-  values: Float32Array;
+  values: Float64Array;
 }
 
-/** JSON has no infinity, and no compact form of many numbers. */
-const INFINITE = '∞';
+/** Of so many bytes of numbers browsers can make a text. Of more samples some are left out. */
+const MOST_BYTES = 128 * 1024 * 1024;
 
+/** JSON has no infinity, and no compact form of many numbers. */
 function forJson(value: unknown): unknown {
-  if (value instanceof Float32Array) return { float32: base64(new Uint8Array(value.buffer, value.byteOffset, value.byteLength)) };
-  return value === Infinity ? INFINITE : value;
+  if (value instanceof Float32Array) return { float32: base64(value) };
+  if (value instanceof Float64Array) return { float64: base64(value) };
+  return value === Infinity ? { infinite: true } : value;
 }
 
 function fromJson(value: unknown): unknown {
-  const packed = (value as { float32?: unknown } | null)?.float32;
-  if (typeof packed === 'string') return new Float32Array(bytesOf(packed).buffer);
-  return value === INFINITE ? Infinity : value;
+  const { float32, float64, infinite } = (value ?? {}) as { float32?: unknown; float64?: unknown; infinite?: unknown };
+  if (typeof float32 === 'string') return new Float32Array(bytesOf(float32).buffer);
+  if (typeof float64 === 'string') return new Float64Array(bytesOf(float64).buffer);
+  return infinite === true ? Infinity : value;
 }
 
-export function store(shown: Shown): string {
-  const samples = shown.recording.samples;
+export function store(shown: Shown, most = MOST_BYTES): string {
+  const all = shown.recording.samples;
   const handles = new Map<number, number>();
   const sizes = new Map(shown.model.variables.map((variable) => [variable.handle, variable.size]));
-  for (const sample of samples) for (const handle of sample.layout.handles) handles.set(handle, sizes.get(handle) ?? 1);
+  for (const sample of all) for (const handle of sample.layout.handles) handles.set(handle, sizes.get(handle) ?? 1);
   const layout = new Layout([...handles].map(([handle, size]) => ({ handle, size })));
-  const values = new Float32Array(layout.width * samples.length).fill(NaN);
+  const stride = Math.ceil((layout.width * all.length * Float64Array.BYTES_PER_ELEMENT) / most) || 1;
+  const samples = all.filter((_, i) => i % stride === 0 || i === all.length - 1);
+  const values = new Float64Array(layout.width * samples.length).fill(NaN);
   samples.forEach((sample, i) => {
     for (const [handle, size] of handles) {
       const from = sample.layout.offset(handle), to = layout.offset(handle);
@@ -75,10 +85,9 @@ export function unstore(text: string): Shown {
   const stored = JSON.parse(text, (_, value) => fromJson(value)) as Stored;
   if (stored.format !== 'mbcosim-recording-1') throw new Error('this is no recording of mbcosim');
   const layout = new Layout(stored.layout);
-  const values = Float64Array.from(stored.values);
   const recording = new Recording(Infinity);
   stored.times.forEach((time, i) =>
-    recording.push({ step: stored.steps[i], time, layout, values: values.slice(i * layout.width, (i + 1) * layout.width) }));
+    recording.push({ step: stored.steps[i], time, layout, values: stored.values.subarray(i * layout.width, (i + 1) * layout.width) }));
   return { title: stored.title, model: stored.model, geometry: stored.geometry, recording, changed: new Signal(0) };
 }
 
@@ -89,12 +98,15 @@ export function recordingPage(page: string, shown: Shown): string {
   return page.replace(place, () => `<script type="application/json" id="recording">${store(shown)}</script>`);
 }
 
-function base64(bytes: Uint8Array): string {
+function base64({ buffer, byteOffset, byteLength }: ArrayBufferView): string {
+  const bytes = new Uint8Array(buffer, byteOffset, byteLength);
   let text = '';
   for (let i = 0; i < bytes.length; i += 0x8000) text += String.fromCharCode(...bytes.subarray(i, i + 0x8000));
   return btoa(text);
 }
 
 function bytesOf(text: string): Uint8Array {
-  return Uint8Array.from(atob(text), (c) => c.charCodeAt(0));
+  const characters = atob(text), bytes = new Uint8Array(characters.length);
+  for (let i = 0; i < bytes.length; ++i) bytes[i] = characters.charCodeAt(i);
+  return bytes;
 }

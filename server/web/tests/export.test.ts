@@ -1,5 +1,5 @@
 import { describe, expect, test } from 'vitest';
-import { csv, recordingPage, store, unstore } from '../src/export';
+import { csv, fileName, recordingPage, store, unstore } from '../src/export';
 import { finish } from '../src/geometry';
 import type { Model, VariableInfo } from '../src/model';
 import { Layout, Recording, valueOf } from '../src/recording';
@@ -25,6 +25,10 @@ describe('a table', () => {
   });
 });
 
+test('a file has the name of what it shows, as far as names of files go', () => {
+  expect([fileName('Träger <b>/1</b>.mbd', 'csv'), fileName('机械臂', 'png')]).toEqual(['Träger_b_1_b_.mbd.csv', '机械臂.png']);
+});
+
 describe('a recording in a file', () => {
   test('gives back what was seen', () => {
     const again = unstore(store(shown()));
@@ -35,6 +39,26 @@ describe('a recording in a file', () => {
     expect(valueOf(again.recording.samples[1], 4, 2)).toBe(6);
     expect(valueOf(again.recording.samples[1], 9)).toBe(0.25);
     expect(valueOf(again.recording.samples[0], 9)).toBeNaN();
+  });
+
+  test('keeps small changes of large numbers, tiny and infinite ones, and names that look like them', () => {
+    const recording = new Recording(), layout = new Layout([X, E]);
+    const values = [[NaN, 4e5, 1e-300, Infinity], [1, 4e5 + 0.001, 2e-300, -1]];
+    values.forEach((row, step) => recording.push({ step, time: 1e6 + step, layout, values: Float64Array.from(row) }));
+    const { recording: again, title } = unstore(store({ ...shown(), title: '∞', recording }));
+    expect(title).toBe('∞');
+    expect(Array.from(again.samples[0].values)).toEqual(values[0]);
+    expect(Array.from(again.samples[1].values)).toEqual(values[1]);
+    expect(again.samples[1].time).toBe(1000001);
+  });
+
+  test('has fewer samples of very many, with the first and the newest', () => {
+    const recording = new Recording(), layout = new Layout([X]);
+    for (let step = 0; step < 1000; ++step) recording.push({ step, time: step, layout, values: Float64Array.of(step, 0, 0) });
+    const { samples } = unstore(store({ ...shown(), recording }, 2400)).recording;
+    expect(samples.length).toBeLessThan(105);
+    expect(samples.map((sample) => valueOf(sample, 4))).toEqual(samples.map((sample) => sample.step));
+    expect([samples[0].step, samples.at(-1)?.step]).toEqual([0, 999]);
   });
 
   test('cannot break out of its place in the page', () => {
