@@ -191,6 +191,10 @@ describe('speed', () => {
       expect((await view.read([])).time).toBeCloseTo(end, 6);
       await reaches(page, end - 1e-6);
       expect((await recorded(page)).length).toBeLessThan(120 * taken + 10);
+      await page.getByRole('button', { name: 'Back to the start' }).click();
+      await atStep(page, 0);
+      await page.locator('.chip', { hasText: 'ready' }).waitFor();
+      expect(await page.getByRole('button', { name: 'Run (space)' }).isEnabled()).toBe(true);
     });
   });
 });

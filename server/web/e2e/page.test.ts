@@ -304,6 +304,12 @@ describe('time', () => {
       await page.getByRole('button', { name: '+10' }).click();
       await atStep(page, 20);
       expect(await view.read(['node.structural.2.X'])).toEqual(later);
+      await button(page, 'Back to the start').click();
+      await atStep(page, 0);
+      expect(await recorded(page)).toEqual([0]);
+      await page.getByRole('button', { name: '+10' }).click();
+      await atStep(page, 10);
+      expect(await view.read(['node.structural.2.X'])).toEqual(saved);
     });
   });
 

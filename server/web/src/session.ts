@@ -324,6 +324,7 @@ export class Session implements Shown {
   /** Ends a run. Steps that are asked for while another call advances are taken after it. */
   async step(steps: number): Promise<void> {
     const waiting = this.owed > 0;
+    this.failure.value = undefined;
     if (this.playing.value !== 'no') this.pause();
     this.owed += steps;
     if (waiting) return;
@@ -342,6 +343,7 @@ export class Session implements Shown {
   }
 
   private playFast(playing: Playing, end: number): Promise<void> {
+    this.failure.value = undefined;
     this.pause();
     this.playing.value = playing;
     return this.drive((wanted) => this.run(end, wanted));
@@ -513,10 +515,19 @@ export class Session implements Shown {
     await this.refreshSnapshots();
   }
 
-  async restore(snapshot: Snapshot): Promise<void> {
+  restore(snapshot: Snapshot): Promise<void> {
+    return this.goBack(() => simulations.restoreSnapshot({ simulation: this.name, snapshot: snapshot.name }));
+  }
+
+  /** To the initial solution. */
+  reset(): Promise<void> {
+    return this.goBack(() => simulations.resetSimulation({ simulation: this.name }));
+  }
+
+  private async goBack(ask: () => Promise<{ simulation?: SimulationInfo }>): Promise<void> {
     this.pause();
     await this.queue(async () => {
-      this.info.value = told((await this.patiently(() => simulations.restoreSnapshot({ simulation: this.name, snapshot: snapshot.name }))).simulation);
+      this.info.value = told((await this.patiently(ask)).simulation);
       this.failure.value = undefined;
       this.stream.abort();  // what is still on its way is of a time undone
       await this.read(true);

@@ -77,6 +77,18 @@ describe('a simulation on the screen', () => {
     await vi.waitFor(() => expect(held).toBe(0));
   });
 
+  test('says nothing more of what failed when something else is asked for', async () => {
+    const session = await Session.open('simulations/1'), failed = { message: 'no', reason: '', metadata: {}, diagnostics: [], cancelled: false };
+    othersRun = 0;
+    for (const ask of [() => session.step(1), () => session.runUntil(1)]) {
+      session.failure.value = failed;
+      void ask();
+      expect(session.failure.value).toBeUndefined();
+    }
+    session.close();
+    await vi.waitFor(() => expect(held).toBe(0));
+  });
+
   test('that is closed while its run waits for others does not run', async () => {
     othersRun = Infinity;
     const session = await Session.open('simulations/1'), run = session.runUntil(1);

@@ -156,7 +156,7 @@ class PlotView {
         height: HEIGHT,
         scales: { x: { time: false } },
         axes: [
-          { ...axis, size: 26, values: texts, space: (_, __, low, high) => 20 + widthOf(ticks([low, high], (high - low) / 10)) },
+          { ...axis, size: 26, values: texts, space: (_, __, low, high) => Math.max(50, 20 + widthOf(ticks([low, high], (high - low) / 10))) },
           { ...axis, size: (_, labels) => Math.max(56, 20 + widthOf(labels ?? [])), values: texts },
         ],
         hooks: { draw: [(chart) => this.drawCursor(chart)], setSelect: [(chart) => this.zoomTo(chart)] },

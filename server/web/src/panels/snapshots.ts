@@ -10,7 +10,8 @@ export function snapshotsPanel(desk: Desk, open: (simulation: string) => void): 
   const list = h('ul', { class: 'list' });
   const save = h('button', { type: 'button', class: 'button', onclick: () => void desk.session?.saveSnapshot('') }, icon('save'), 'Save state');
   const fork = h('button', { type: 'button', class: 'button', onclick: () => void branch() }, icon('branch'), 'Branch off here');
-  const panel = section('Snapshots', true, h('div', { class: 'legend' }, save, fork), list);
+  const reset = h('button', { type: 'button', class: 'button', onclick: () => void desk.session?.reset() }, icon('restore'), 'Back to the start');
+  const panel = section('Snapshots', true, h('div', { class: 'legend' }, save, fork, reset), list);
   let unwatch = () => {};
 
   const branch = async (snapshot?: Snapshot) => {
