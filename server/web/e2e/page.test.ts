@@ -763,7 +763,7 @@ describe('who waits for whom', () => {
 
 describe('solver and events', () => {
   test('tell iterations, residual, times and what happened', async () => {
-    await withPage(browser, 'pendulum.mbd', async ({ page }) => {
+    await withPage(browser, 'pendulum.mbd', async ({ page, faults }) => {
       await page.getByRole('button', { name: '+10' }).click();
       await atStep(page, 10);
       const solver = page.locator('.section', { hasText: 'iterations in the last step' });
@@ -773,6 +773,14 @@ describe('solver and events', () => {
       await page.getByRole('button', { name: 'Save state' }).click();
       await page.locator('summary', { hasText: 'Events' }).click();
       await page.getByRole('log', { name: 'Events' }).getByText('saved the state at step 10').waitFor();
+      // What is refused is told once.
+      await page.route('**/mbcosim.v1.*/{ReadVariables,Subscribe}', (route) => route.fulfill({ status: 400, contentType: 'application/json', body: '{"code":"failed_precondition","message":"of no use"}' }));
+      await page.reload();
+      const close = page.locator('.banner').getByRole('button', { name: 'Close' });
+      await close.click();
+      await polled(page, 3);
+      expect(await close.count()).toBe(0);
+      expect(faults.splice(0).join()).toContain('400');
     });
   });
 });

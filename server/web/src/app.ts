@@ -201,7 +201,7 @@ export class App {
     const { waits } = session.info.value, waiting = waits.map((wait) => `waits ${wait.hasPeer ? 'for the peer of' : 'for a peer on'} port ${wait.port}`);
     const failure = session.failure.value;
     this.banner.classList.toggle('bad', failure !== undefined || state === 'lost');
-    if (failure && !(lost && failure.passing)) this.say(failure, () => [h('div', { class: 'text' }, h('strong', {}, failure.message), this.worst(), diagnosticsList(failure.diagnostics)),
+    if (failure && !gone && !(lost && failure.passing)) this.say(failure, () => [h('div', { class: 'text' }, h('strong', {}, failure.message), this.worst(), diagnosticsList(failure.diagnostics)),
       iconButton('close', 'Close', () => (session.failure.value = undefined), { class: 'icon-button small' })]);
     else if (lost) this.say(gone ? GONE : lost);
     else this.say(waiting.join('\n'), () => [h('div', { class: 'text' }, ...waiting.map((words) => h('div', {}, words, h('span', { class: 'since', 'aria-hidden': 'true' }))))]);

@@ -82,6 +82,8 @@ export class Session implements Shown {
   /** Whether samples come by a stream. Otherwise they are read now and then. */
   private following = false;
   private fast = new AbortController();
+  /** Step whose values were refused: they are not asked for again and again. */
+  private unreadable = -1;
   /** Step of the last sample of the stream. */
   private streamed = -1;
   /** While a call advances, or what it came to is read. */
@@ -164,7 +166,9 @@ export class Session implements Shown {
       const reply = await simulations.readVariables({ simulation: this.name, handles: [...layout.handles] });
       this.take({ step: Number(reply.step), time: reply.time, layout, values: Float64Array.from(reply.values) }, undone);
     } catch (thrown) {
-      this.tell(failureOf(thrown));
+      const failure = failureOf(thrown);
+      if (!failure.passing) this.unreadable = Number(this.info.value.step);
+      this.tell(failure);
     }
   }
 
@@ -276,7 +280,7 @@ export class Session implements Shown {
   private behind(): boolean {
     const { state, step } = this.info.value;
     const rests = state !== SimulationState.STEPPING && this.playing.value === 'no';
-    return (rests || !this.following) && Number(step) !== this.recording.last?.step;
+    return (rests || !this.following) && Number(step) !== this.recording.last?.step && Number(step) !== this.unreadable;
   }
 
   // ---- what is done
