@@ -380,7 +380,7 @@ describe('plots', () => {
         const download = page.waitForEvent('download');
         await page.getByRole('button', { name: 'Export' }).click();
         await page.getByRole('button', { name: 'Table of the plots (CSV)' }).click();
-        await page.keyboard.press('Escape');
+        expect(await page.locator('.top .menu').isVisible()).toBe(false);
         return readFileSync(await (await download).path(), 'utf8').trim().split('\n');
       };
       await page.getByRole('button', { name: '+10' }).click();
@@ -546,8 +546,15 @@ async function becomes(view: View, name: string, values: number[]): Promise<void
 describe('inputs', () => {
   test('are set by their sliders', async () => {
     await withPage(browser, 'pendulum_cart.mbd', async ({ page }, view) => {
+      let answer = () => {};
+      const held = new Promise<void>((resolve) => (answer = resolve));
+      await page.route('**/mbcosim.v1.*/{ReadVariables,Subscribe}', (route) => held.then(() => route.continue()));
       await page.locator('summary', { hasText: 'Inputs' }).click();
-      await page.getByRole('slider', { name: 'stream.force' }).fill('2.5');
+      const slider = page.getByRole('slider', { name: 'stream.force' });
+      expect([await slider.isDisabled(), await slider.inputValue()]).toEqual([true, '0']);
+      answer();
+      await page.unrouteAll({ behavior: 'wait' });
+      await slider.fill('2.5');
       await becomes(view, 'stream.force', [2.5]);
       const field = page.getByRole('textbox', { name: 'stream.force, value' });
       for (const [written, value, complaint] of [['1,5', 2.5, '"1,5" is no number.'], ['', 2.5, ''], ['−4e1', -40, '']] as const) {
@@ -1170,6 +1177,10 @@ describe('for everybody', () => {
       await button(page, 'Hz damping').first().press('Enter');
       expect(await focused()).toContain('Hz');
       await page.keyboard.press('Enter');
+      await button(page, 'Show').press('Enter');
+      await page.keyboard.press('Tab');
+      await page.keyboard.press('Escape');
+      expect(await focused()).toBe('Show');
       await page.keyboard.press('?');
       await page.getByRole('dialog', { name: 'Keys' }).waitFor();
       await page.keyboard.press('Escape');

@@ -98,21 +98,22 @@ export class App {
   // ---- parts
 
   private top(): HTMLElement {
+    const entry = (picture: string, label: string, action: () => void) => h('button', { type: 'button', class: 'button', onclick: () => {
+      save.click();  // closes the menu
+      save.focus();
+      action();
+    } }, icon(picture), label);
     const menu = h('div', { class: 'menu hidden' },
-      this.menuEntry('camera', 'Picture (PNG)', () => void this.savePicture()),
-      this.menuEntry('plot', 'Table of the plots (CSV)', () => this.saveTable()),
-      this.recorded ? '' : this.menuEntry('download', 'Recording (HTML)', () => this.saveRecording()));
-    const save = h('button', { type: 'button', class: 'button', 'aria-label': 'Export', 'aria-expanded': 'false', onclick: () => toggle(save, menu) }, icon('download'), h('span', {}, 'Export'));
+      entry('camera', 'Picture (PNG)', () => void this.savePicture()),
+      entry('plot', 'Table of the plots (CSV)', () => this.saveTable()),
+      this.recorded ? '' : entry('download', 'Recording (HTML)', () => this.saveRecording()));
+    const save: HTMLButtonElement = h('button', { type: 'button', class: 'button', 'aria-label': 'Export', 'aria-expanded': 'false', onclick: () => toggle(save, menu) }, icon('download'), h('span', {}, 'Export'));
     const brand = h('div', { class: 'brand' });
     brand.innerHTML = '<svg viewBox="0 0 32 32" aria-hidden="true"><path d="M5 8h9l9 14" fill="none" stroke="#35c2a8" stroke-width="3"/><circle cx="5" cy="8" r="4" fill="#f0a13c"/><circle cx="14" cy="8" r="3" fill="#9aa7b4"/><circle cx="23" cy="23" r="5.4" fill="#4aa8ff"/></svg>';
     brand.append('mbcosim');
     return h('header', { class: 'top' }, brand, this.name, this.chip, h('span', { class: 'spacer' }), h('div', { class: 'anchor end' }, save, menu),
       iconButton('theme', 'Dark and light (D)', () => this.setTheme(this.desk.theme.value === 'dark' ? 'light' : 'dark')),
       iconButton('help', 'Keys (?)', () => this.help.showModal()));
-  }
-
-  private menuEntry(picture: string, label: string, action: () => void): HTMLElement {
-    return h('button', { type: 'button', class: 'button', onclick: action }, icon(picture), label);
   }
 
   private fillLeft(): void {

@@ -51,8 +51,8 @@ export function inputsPanel(desk: Desk): HTMLElement {
     };
     const lines = Array.from({ length: count }, (_, k) => {
       const name = curveName(variable.name.replace('node.structural.', 'node '), variable.size, k);
-      const slider = h('input', { type: 'range', min: -10, max: 10, step: 'any', 'aria-label': name });
-      const field = numberField({ 'aria-label': `${name}, value` });
+      const slider = h('input', { type: 'range', min: -10, max: 10, step: 'any', value: 0, disabled: true, 'aria-label': name });
+      const field = numberField({ disabled: true, 'aria-label': `${name}, value` });
       slider.addEventListener('input', () => {
         field.value = editable(slider.valueAsNumber, 4);
         write(k, slider.valueAsNumber);
@@ -78,6 +78,7 @@ export function inputsPanel(desk: Desk): HTMLElement {
         values[k] = value;
         if (k >= count) return;
         const { slider, field } = fields[k];
+        slider.disabled = field.disabled = false;  // from when on its numbers are known
         if (document.activeElement === slider || document.activeElement === field) return;
         widen(slider, value);
         slider.value = String(value);

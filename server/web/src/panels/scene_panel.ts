@@ -232,6 +232,7 @@ export function toggle(button: HTMLElement, menu: HTMLElement): void {
   if (!open) return;
   const close = (event: Event) => {
     if (event instanceof KeyboardEvent ? event.key !== 'Escape' : menu.contains(event.target as Node) || button.contains(event.target as Node)) return;
+    if (menu.contains(document.activeElement)) button.focus();
     menu.classList.add('hidden');
     button.setAttribute('aria-expanded', 'false');
     document.removeEventListener('pointerdown', close);
