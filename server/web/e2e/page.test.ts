@@ -355,7 +355,7 @@ describe('time', () => {
 
 describe('on a narrow screen', () => {
   test('all of time is at hand, and nothing is wider than the screen', async () => {
-    await withPage(browser, 'pendulum.mbd', async ({ page }) => {
+    await withPage(browser, 'pendulum.mbd', async ({ page, faults }) => {
       const end = page.getByRole('textbox', { name: 'Run until, in seconds' });
       await end.fill('0.1');
       await page.getByRole('button', { name: 'Run until this time' }).click();
@@ -365,7 +365,12 @@ describe('on a narrow screen', () => {
       for (const name of ['Run (space)', 'One step (S)', '+10', 'live', 'Replay what was recorded, in a loop', 'ortho']) expect(await page.getByRole('button', { name }).isVisible(), name).toBe(true);
       await page.getByRole('combobox', { name: 'Speed' }).selectOption('0.5');
       expect(await page.evaluate(() => document.documentElement.scrollWidth)).toBe(390);
-      expect((await page.locator('.time').boundingBox())?.height).toBeLessThan(110);
+      expect((await page.locator('.time').boundingBox())?.height).toBeLessThan(95);
+      await page.route('**/mbcosim.v1.Simulations/CreateSnapshot', (route) => route.fulfill({ status: 400, contentType: 'application/json', body: '{"code":"failed_precondition","message":"of no use"}' }));
+      await page.getByRole('tab', { name: 'Panels' }).click();
+      await button(page, 'Save state').click();
+      await page.locator('.banner').getByRole('button', { name: 'Close' }).click();  // it is in front
+      faults.length = 0;  // the browser reports the refusal, too
     }, { width: 390, height: 780 });
   });
 });
