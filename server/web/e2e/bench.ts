@@ -305,6 +305,7 @@ interface Inside {
         nodeMatrix(index: number): number[]; trails?: { object: { geometry: { attributes: { position?: { array: ArrayLike<number> } } } } }; picture(): Promise<Blob>; drawCalls: number; layers(): string[];
         camera: { projectionMatrix: { elements: number[] }; matrixWorldInverse: { elements: number[] } };
         canvas: HTMLCanvasElement;
+        renderer: { info: { memory: { geometries: number } } };
         drawn: { batches: { layer: string; batch: { where: ArrayLike<number> } }[] };
       };
     };
@@ -454,6 +455,12 @@ export async function atStep(page: Page, step: number): Promise<void> {
 /** Calls to the graphics card for the last picture. */
 export function drawCalls(page: Page): Promise<number> {
   return page.evaluate(() => (window as unknown as Inside).mbcosim.scene.view.drawCalls);
+}
+
+/** Things that the graphics card keeps. */
+export async function kept(page: Page): Promise<number> {
+  await scene(page);  // what is on show is drawn
+  return page.evaluate(() => (window as unknown as Inside).mbcosim.scene.view.renderer.info.memory.geometries);
 }
 
 /** Pictures a second, while the page replays what it recorded. */

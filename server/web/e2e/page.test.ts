@@ -6,7 +6,7 @@ import { createRequire } from 'node:module';
 import { tmpdir } from 'node:os';
 import { dirname, join } from 'node:path';
 import { afterAll, beforeAll, describe, expect, test } from 'vitest';
-import { ask, atStep, create, curvesDrawn, Daemon, decks, drawCalls, drawnLayers, FACTOR, follows, frameRate, freePort, hide, launch, MODELS, moveSliderUnderSample, newTab, picture, proxy, recorded, rested, samplesHave, samplesReach, scene, shown, turnTo, until, View, visit, withPage, type Visit } from './bench';
+import { ask, atStep, create, curvesDrawn, Daemon, decks, drawCalls, drawnLayers, FACTOR, follows, frameRate, freePort, hide, kept, launch, MODELS, moveSliderUnderSample, newTab, picture, proxy, recorded, rested, samplesHave, samplesReach, scene, shown, turnTo, until, View, visit, withPage, type Visit } from './bench';
 
 let browser: Browser;
 beforeAll(async () => {
@@ -75,6 +75,17 @@ describe('each example deck', () => {
     expect(visited.faults).toEqual([]);
     await turnTo(visited.page, view.simulation);
     await view.call('Simulations/DeleteSimulation', { simulation });
+  });
+
+  test('leave nothing behind in the graphics card when another is shown', async () => {
+    const { page } = visited, other = await create(view, 'heavy_top.mbd'), counts: number[] = [];
+    for (let round = 0; round < 3; ++round) {
+      await turnTo(page, other);
+      await kept(page);
+      await turnTo(page, view.simulation);
+      counts.push(await kept(page));
+    }
+    expect(counts[2]).toBe(counts[1]);
   });
 });
 

@@ -20,7 +20,7 @@ export function roundBelow(length: number): number {
 }
 
 export class Grid {
-  readonly object: THREE.LineSegments;
+  readonly object: THREE.LineSegments<THREE.BufferGeometry, THREE.Material>;
   /** Length of a cell. */
   readonly cell: number;
 

@@ -3,7 +3,7 @@ import * as THREE from 'three';
 import type { Vec3 } from '../algebra';
 
 export class Trails {
-  readonly object: THREE.LineSegments;
+  readonly object: THREE.LineSegments<THREE.BufferGeometry, THREE.Material>;
 
   constructor(colour: THREE.Color) {
     this.object = new THREE.LineSegments(new THREE.BufferGeometry(), new THREE.LineBasicMaterial({ color: colour }));

@@ -359,8 +359,12 @@ export class View {
 
   private clear(): void {
     if (this.drawn) this.removeBatches(this.drawn);
-    if (this.trails) this.scene.remove(this.trails.object);
-    if (this.grid) this.scene.remove(this.grid.object);
+    for (const lines of [this.trails?.object, this.grid?.object]) {
+      if (!lines) continue;
+      this.scene.remove(lines);
+      lines.geometry.dispose();
+      lines.material.dispose();
+    }
     this.drawn = undefined;
   }
 
