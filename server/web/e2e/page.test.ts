@@ -77,6 +77,24 @@ describe('each example deck', () => {
     await view.call('Simulations/DeleteSimulation', { simulation });
   });
 
+  test('and their names are shown as they are written', async () => {
+    const { page } = visited, odd = '<img src=x onerror=document.title=1>', deck = pendulums(2).replace('body: 1, 1,', `body: 1, name, "${odd}", 1,`);
+    const load = (text: string) => view.call<{ simulation: { name: string } }>('Simulations/CreateSimulationInline', {
+      header: { bundleMainFile: `${odd}.mbd`, options: { displayName: odd } }, files: [{ path: `${odd}.mbd`, data: Buffer.from(text).toString('base64') }],
+    });
+    await turnTo(page, (await load(deck)).simulation.name);
+    await page.locator('.title').getByText(odd).waitFor();
+    await page.getByRole('button', { name: `body 1 · ${odd}`, exact: true }).click();
+    await page.locator('.written figcaption').getByText(`${odd}.mbd`).waitFor();
+    await askForDeck(page);
+    await page.getByLabel('Files of a deck').setInputFiles({ name: `${odd}.mbd`, mimeType: 'text/plain', buffer: Buffer.from(deck.replace('spherical pin', odd)) });
+    await page.locator('.diagnostic strong').getByText(`${odd}.mbd`).first().waitFor();
+    expect(visited.faults.splice(0)).toEqual([expect.stringContaining('400')]);  // the browser reports the refusal
+    expect(await page.evaluate(() => document.images.length)).toBe(0);
+    await button(page, 'Back to the simulation').click();
+    await turnTo(page, view.simulation);
+  });
+
   test('leave nothing behind in the graphics card when another is shown', async () => {
     const { page } = visited, other = await create(view, 'heavy_top.mbd'), counts: number[] = [];
     for (let round = 0; round < 3; ++round) {

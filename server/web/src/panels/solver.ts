@@ -2,7 +2,7 @@
 import uPlot from 'uplot';
 import type { Desk } from '../desk';
 import { h } from '../dom';
-import { number, seconds } from '../format';
+import { number, seconds, ticks } from '../format';
 import type { StepRecord } from '../session';
 import { section } from './section';
 
@@ -53,7 +53,7 @@ export function solverPanel(desk: Desk): HTMLElement {
         width: Math.max(canvas.clientWidth, 200),
         height: 130,
         scales: { x: { time: false }, y: { range: (_, low, high) => [Math.min(low ?? 0, 0), Math.max(high ?? 1, 1) + 1] }, log: { range: (_, low, high) => [Math.floor(low ?? -12), Math.ceil(high ?? -6)] } },
-        axes: [{ ...axis, size: 30 }, { ...axis, stroke: PARTS[0].colour, size: 28, incrs: [1, 2, 5, 10, 20, 50, 100] }, { ...axis, stroke: PARTS[1].colour, size: 48, side: 1, scale: 'log', grid: { show: false }, values: (_, ticks) => ticks.map((tick) => (Number.isInteger(tick) ? `1e${tick}` : '')) }],
+        axes: [{ ...axis, size: 30, values: (_, values, __, ___, increment) => ticks(values, increment) }, { ...axis, stroke: PARTS[0].colour, size: 28, incrs: [1, 2, 5, 10, 20, 50, 100] }, { ...axis, stroke: PARTS[1].colour, size: 48, side: 1, scale: 'log', grid: { show: false }, values: (_, ticks) => ticks.map((tick) => (Number.isInteger(tick) ? `1e${tick}` : '')) }],
         series: [{}, { label: 'iterations', stroke: PARTS[0].colour, width: 1.4 }, { label: 'residual', stroke: PARTS[1].colour, scale: 'log', width: 1.2 }],
         cursor: { show: false },
       },
