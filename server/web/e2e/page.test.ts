@@ -546,6 +546,7 @@ describe('what can be taken away', () => {
     expect((await picture(again.page)).covered).toBeGreaterThan(0.002);
     await again.page.getByRole('button', { name: 'Export' }).click();
     expect(await again.page.getByRole('button', { name: 'Recording (HTML)' }).count()).toBe(0);  // it is one
+    expect(await again.page.getByRole('button', { name: 'Table of the plots (CSV)' }).isDisabled()).toBe(true);  // there are none
     expect(again.faults).toEqual([]);
     await again.close();
     await visited.close();

@@ -32,7 +32,7 @@ export class App {
   private readonly time = new TimeBar(this.desk);
   private readonly banner = h('div', { class: 'banner hidden', role: 'alert' });
   private readonly chip = h('span', { class: 'chip' });
-  private readonly name = h('span', { class: 'title' });
+  private readonly name = h('h1', { class: 'title' });
   private readonly shell: HTMLElement;
   private readonly left = h('nav', { class: 'left', 'aria-label': 'Model' });
   private readonly help = this.helpDialog();
@@ -103,9 +103,11 @@ export class App {
       save.focus();
       action();
     } }, icon(picture), label);
+    const table = entry('plot', 'Table of the plots (CSV)', () => this.saveTable());
+    this.desk.plots.watch((plots) => (table.disabled = plots.length === 0));
     const menu = h('div', { class: 'menu hidden' },
       entry('camera', 'Picture (PNG)', () => void this.savePicture()),
-      entry('plot', 'Table of the plots (CSV)', () => this.saveTable()),
+      table,
       this.recorded ? '' : entry('download', 'Recording (HTML)', () => this.saveRecording()));
     const save: HTMLButtonElement = h('button', { type: 'button', class: 'button', 'aria-label': 'Export', 'aria-expanded': 'false', onclick: () => toggle(save, menu) }, icon('download'), h('span', {}, 'Export'));
     const brand = h('div', { class: 'brand' });

@@ -2,7 +2,7 @@
 import { add, norm, scale, subtract, vec3, type Vec3 } from '../algebra';
 import type { Desk } from '../desk';
 import { h, icon, iconButton } from '../dom';
-import { clock, number } from '../format';
+import { clock, number, ticks } from '../format';
 import { pointAt, PoseReader, positionOf, type Pose } from '../geometry';
 import { amplitude, MovedPose, type Mode } from '../modes';
 import { ASKED_FOR, type Layer, type Legend } from '../scene/build';
@@ -216,8 +216,8 @@ export class ScenePanel {
 
 /** What the colours between two ends mean. */
 function legend({ name, least, largest, low, high }: Legend, unit: string): HTMLElement {
-  return h('div', { class: 'scale', style: `--low:${low};--high:${high}` }, h('span', {}, name), h('span', { class: 'number' }, number(least, 3)),
-    h('i'), h('span', { class: 'number' }, `${number(largest, 3)}${unit}`));
+  const [from, to] = ticks([least, largest], (largest - least) / 10);
+  return h('div', { class: 'scale', style: `--low:${low};--high:${high}` }, h('span', {}, name), h('span', { class: 'number' }, from), h('i'), h('span', { class: 'number' }, `${to}${unit}`));
 }
 
 function check(name: string, on: boolean, change: (on: boolean) => void): HTMLElement {

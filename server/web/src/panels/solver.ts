@@ -35,7 +35,7 @@ export function solverPanel(desk: Desk): HTMLElement {
     const count = recent.reduce((sum, step) => sum + step.steps, 0), solver = recent.reduce((sum, step) => sum + step.solver, 0);
     const rows: [string, string][] = last
       ? [['iterations in the last step', String(last.iterations)], ['residual', number(last.residual, 3)], ['solver time a step', seconds(count > 0 ? solver / count : 0)]]
-      : [['', 'no step from this page yet']];
+      : [['no step from this page yet', '']];
     facts.replaceChildren(...rows.map(([name, text]) => h('tr', {}, h('th', { scope: 'row' }, name), h('td', {}, text))));
     PARTS.forEach((part, k) => (times[k].textContent = count > 0 ? seconds(recent.reduce((sum, step) => sum + part.of(step), 0) / count) : ''));
     const split = timeSplit(recent);
