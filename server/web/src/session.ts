@@ -390,9 +390,10 @@ export class Session implements Shown {
   private async pace(wanted: () => boolean): Promise<void> {
     await this.refresh();  // others, and a run that was left, may have gone on since
     const pace = new Pace(this.speed.value, performance.now() / 1000, this.info.value.time);
-    for (; wanted(); await this.doWaiting()) {
-      const info = this.info.value;
-      const target = pace.next(performance.now() / 1000, info.time, info.nextStepSize || this.model.step);
+    for (let rested = 0; wanted(); await this.doWaiting()) {
+      const info = this.info.value, now = performance.now() / 1000;
+      const target = pace.next(now, info.time, info.nextStepSize || this.model.step, document.hidden && rested ? now - rested : 0);
+      rested = target === undefined ? now : 0;
       if (target === undefined) await pause(8);
       else await this.advance({ case: 'untilTime', value: target }, wanted);
       if (wanted() && this.info.value.state === SimulationState.FINISHED) this.pause();
