@@ -6,7 +6,7 @@ function reply = mbcosim_call(door, method, request)
 %   REQUEST   struct with the fields of the method's request; 64-bit numbers as text, lists as cell arrays
 %   REPLY     struct with the fields of its reply, in lower camel case; 64-bit numbers come as text
 %
-% A call that fails is an error with the service's message.
+% A call that fails is an error with the service's message; its identifier is the code, mbcosim:not_found say, or mbcosim:connection.
   if isempty(fieldnames(request))
     body = '{}';
   else
@@ -22,23 +22,29 @@ function reply = mbcosim_call(door, method, request)
   end
   reply = jsondecode(text);
   if isfield(reply, 'code')
-    error('mbcosim:%s', [reply.code, ' ', reply.message]);
+    error(['mbcosim:', reply.code], '%s', reply.message);
   end
 end
 
 function text = post(address, token, body)
-% Octave's webwrite sends forms only: curl sends the JSON. Token and body go through a file that only this user can read.
+% Octave's webwrite sends forms only: curl sends the JSON. Token and body go through files that only this user can read.
+  [sent, removed] = private_file(body);
+  head = sprintf('header = "Authorization: Bearer %s"\nheader = "Content-Type: application/json"\nurl = "%s"\n', token, address);
+  [config, removed_too] = private_file(head);
+  [status, text] = system(['curl --silent --show-error --max-time 600 --config "', config, '" --data-binary "@', sent, '" 2>&1']);
+  if status ~= 0
+    error('mbcosim:connection', '%s', strtrim(text));
+  end
+end
+
+function [file, removed] = private_file(text)
+% A new file with TEXT, which goes with REMOVED.
   file = tempname();
   handle = fopen(file, 'w');
-  if handle < 0 || system(['chmod 600 ', file]) ~= 0
+  removed = onCleanup(@() delete(file));
+  if handle < 0 || system(['chmod 600 "', file, '"']) ~= 0
     error('mbcosim:file', 'cannot write %s', file);
   end
-  quoted = strrep(strrep(body, '\', '\\'), '"', '\"');
-  fprintf(handle, 'header = "Authorization: Bearer %s"\nheader = "Content-Type: application/json"\ndata = "%s"\nurl = "%s"\n', token, quoted, address);
+  fwrite(handle, text);
   fclose(handle);
-  [status, text] = system(['curl --silent --show-error --max-time 600 --config ', file]);
-  delete(file);
-  if status ~= 0
-    error('mbcosim:connection', '%s', text);
-  end
 end

@@ -2,9 +2,12 @@
 %
 %   mbcosim view client_examples/models/pendulum.mbd
 %
-% and hand over the address that it prints:  octave-cli pendulum.m ADDRESS
-arguments = argv();
-door = mbcosim_door(arguments{end});
+% and hand over the address that it prints:  octave-cli pendulum.m ADDRESS, in MATLAB by page = 'ADDRESS'; pendulum
+if ~exist('page', 'var')
+  arguments = argv();
+  page = arguments{end};
+end
+door = mbcosim_door(page);
 
 description = mbcosim_call(door, 'Simulations/DescribeSimulation', struct('simulation', door.simulation, 'variable_prefix', 'node.structural.2.'));
 model = description.model;
@@ -18,5 +21,5 @@ mbcosim_call(door, 'Simulations/WriteVariables', struct('simulation', door.simul
 request = struct('simulation', door.simulation, 'steps', '20', 'outputs', {{handle('node.structural.2.X')}});
 for k = 1:5
   reply = mbcosim_call(door, 'Simulations/Step', request);
-  printf('%.1f s  %9.6f %9.6f %9.6f\n', reply.time, reply.outputs);
+  fprintf('%.1f s  %9.6f %9.6f %9.6f\n', reply.time, reply.outputs);
 end
