@@ -117,16 +117,13 @@ class Parts(Mapping[Key, Part]):
 
     def __init__(self, what: str, parts: list[Part]) -> None:
         self._what, self._parts = what, parts
-
-    def _find(self, key: Key) -> list[Part]:
-        if isinstance(key, tuple):
-            return [part for part in self._parts if (part.family, part.label) == key]
-        if isinstance(key, str):
-            return [part for part in self._parts if part.name == key]
-        return [part for part in self._parts if part.label == key]
+        self._called: dict[Key, list[Part]] = {}
+        for part in parts:
+            for key in (part.label, part.name, (part.family, part.label)):
+                self._called.setdefault(key, []).append(part)
 
     def __getitem__(self, key: Key) -> Part:
-        found = self._find(key)
+        found = self._called.get(key, [])
         if len(found) == 1:
             return found[0]
         if found and found[0].family == "structural" and not isinstance(key, str):  # the usual one
@@ -138,9 +135,8 @@ class Parts(Mapping[Key, Part]):
         raise UnknownName(f"no {self._what.rstrip('s')} is called {key!r}; {remedy(key, known)}")
 
     def __iter__(self) -> Iterator[Key]:
-        labels = [part.label for part in self._parts]
         for part in self._parts:
-            yield part.label if labels.count(part.label) == 1 else (part.family, part.label)
+            yield part.label if len(self._called[part.label]) == 1 else (part.family, part.label)
 
     def __len__(self) -> int:
         return len(self._parts)
@@ -204,7 +200,7 @@ class Inputs(Variables, MutableMapping[str, Value]):
 
 
 def _all_parts(simulation: Simulation) -> list[Part]:
-    return [*simulation.nodes.values(), *simulation.elements.values()]
+    return simulation._nodes() + simulation._elements()
 
 
 class ModelObjects:
