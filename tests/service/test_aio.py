@@ -291,6 +291,17 @@ def test_a_closed_peer_cancels_the_function_that_hangs(daemon):
     run(daemon, body)
 
 
+def test_the_motions_of_a_function_are_not_iterated_over(daemon):
+    async def body(_, simulation):
+        async with await simulation.couple("spring", spring) as peer:
+            with pytest.raises(TypeError, match="attach the peer without one"):
+                async for _ in peer:
+                    pass
+            assert (await simulation.step()).step == 1
+
+    run(daemon, body)
+
+
 def test_synchronous_peers_and_views(server):
     """The blocking client without a callback: the arrays are views of the received bytes."""
     import threading

@@ -1,4 +1,5 @@
 """Peers on ports: the modes, their order, their failures."""
+import pickle
 import re
 import sys
 import time
@@ -235,6 +236,33 @@ def test_a_peer_may_attach_again(server):
             with simulation.couple("spring", spring):
                 assert simulation.step(5).step == 5 * (attempt + 1)
             wait_for(lambda: not simulation.describe().ports[0].has_peer)
+
+
+def test_a_peer_that_leaves_within_its_function_leaves_the_port(server):
+    def leave(motion):
+        peer.close()
+        return spring(motion)
+
+    with oscillator(server) as simulation:
+        peer = simulation.couple("spring", leave, peer_timeout=0.2)
+        with pytest.raises(mbcosim.StepFailed, match="the peer is gone"):
+            simulation.step()
+        assert peer.raised is None
+        with simulation.couple("spring", spring):
+            assert simulation.step().step == 1
+
+
+def test_the_motions_of_a_function_are_not_iterated_over(server):
+    with oscillator(server) as simulation, simulation.couple("spring", spring) as peer:
+        with pytest.raises(TypeError, match="attach the peer without one"):
+            list(peer)
+        assert simulation.step().step == 1
+
+
+def test_a_rejection_travels_between_processes():
+    """As one does that a function raises in a worker of a pool."""
+    there = pickle.loads(pickle.dumps(mbcosim.Reject(0.25, "a shorter one")))
+    assert (there.preferred_step_size, there.text, str(there)) == (0.25, "a shorter one", "a shorter one")
 
 
 def test_a_second_peer_is_refused(server):

@@ -459,8 +459,12 @@ class Peer(exchange.Course):
             task.cancel()
             await asyncio.wait([task], timeout=PARTING / 2)
 
-    async def __aiter__(self) -> AsyncIterator[exchange.Motion]:
+    def __aiter__(self) -> AsyncIterator[exchange.Motion]:
         """Every Motion until the stream ends."""
+        exchange.check_synchronous(self._function)
+        return self._motions()
+
+    async def _motions(self) -> AsyncIterator[exchange.Motion]:
         while True:
             self._waiting_since = time.monotonic()
             try:
@@ -512,7 +516,7 @@ class Peer(exchange.Course):
 
     async def _serve(self) -> None:
         assert self._function is not None
-        async for motion in self:
+        async for motion in self._motions():
             try:
                 value = self._function(motion)
                 message = self._answer(await value if inspect.isawaitable(value) else value)

@@ -132,12 +132,16 @@ class Peer(exchange.Course):
         """Leaves the port."""
         self._closing.set()
         self._out.put(None)
-        if self._function is not None:
+        if self._function is not None and self._thread is not threading.current_thread():
             self._thread.join(PARTING)
         self._stream.cancel()
 
     def __iter__(self) -> Iterator[exchange.Motion]:
         """Every Motion until the stream ends."""
+        exchange.check_synchronous(self._function)
+        return self._motions()
+
+    def _motions(self) -> Iterator[exchange.Motion]:
         try:
             while True:
                 self._waiting_since = time.monotonic()
@@ -175,7 +179,7 @@ class Peer(exchange.Course):
 
     def _serve(self) -> None:
         assert self._function is not None
-        for motion in self:
+        for motion in self._motions():
             try:
                 self.answer(self._function(motion))
             except BaseException as error:  # whatever the user's code raises becomes a failed step with this text

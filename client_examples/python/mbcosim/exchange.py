@@ -3,7 +3,7 @@ from __future__ import annotations
 
 import dataclasses
 import struct
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from typing import Any, Optional, Union
 
 import grpc
@@ -66,6 +66,9 @@ class Reject(Exception):
         if preferred_step_size is not None and not 0 < preferred_step_size < np.inf:
             raise ValueError(f"`preferred_step_size` must be positive, got {preferred_step_size}")
         self.preferred_step_size, self.text = preferred_step_size, text
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return type(self), (self.preferred_step_size, self.text)
 
 
 @dataclasses.dataclass
@@ -321,6 +324,12 @@ def failure(number: int, error: BaseException) -> pb.PeerMessage:
     if isinstance(error, Reject):
         return _rejection(number, error)
     return pb.PeerMessage(exchange=pb.PeerExchange(index=number, failure=_told(error)))
+
+
+def check_synchronous(function: Optional[Callable[[Motion], Any]]) -> None:
+    """TypeError for a peer whose `function` takes the motions that somebody would iterate over."""
+    if function is not None:
+        raise TypeError("the peer's function takes every motion; to iterate over them attach the peer without one")
 
 
 class Course:
