@@ -18,7 +18,7 @@ import decks
 import mbcosim
 import mbcosim.aio
 from conftest import MODELS, TIME_FACTOR, stop, wait_for
-from mbcosim import access
+from mbcosim import access, objects
 from mbcosim.v1 import simulations_pb2 as pb
 from test_analysis import OSCILLATOR, S
 from test_health import certificate
@@ -456,6 +456,36 @@ def test_nodes_of_ports_and_units_of_another_kind_are_told(server, swing, pendul
     for call in (lambda: server.load(pendulum, units="mm"), lambda: swing.couple("wing", lambda m: m.x, units="mm")):
         with pytest.raises(TypeError, match="`units` must be a system made by mbcosim.units, .* say, got 'mm'"):
             call()
+
+
+def test_lists_of_ports_and_grants_and_conditions_of_another_kind_are_told(server, swing, pendulum):
+    tip, everybody = mbcosim.structural_port("tip", nodes=[2]), mbcosim.grant("*", "observe")
+    for make in (lambda **options: server.load(pendulum, **options), swing.fork):
+        for ports in (tip, "tip", ["tip"]):
+            with pytest.raises(TypeError, match=r"`ports` must be a list of ports, \[.*\] say, got"):
+                make(ports=ports)
+    for call in (lambda grants: server.load(pendulum, grants=grants), lambda grants: swing.update(grants=grants)):
+        for grants in (everybody, "*", ["*"]):
+            with pytest.raises(TypeError, match=r"`grants` must be a list of grants, \[.*\] say, got"):
+                call(grants)
+    with pytest.raises(TypeError, match=r"`ports` must be a list of names, .* say \['tip'\]"):
+        mbcosim.grant("token:ann", "couple", "tip")
+    with pytest.raises(TypeError, match="`until` must be a mbcosim.Condition, .* got 1.0; run_until takes a time"):
+        swing.step(until=1.0)
+
+
+def test_one_of_many_parts_is_found_without_a_look_at_each():
+    """All of 10 000 nodes, or an input by the end of its name, took seconds."""
+    looks = []
+
+    class Watched(objects.Part):
+        def __getattribute__(self, name):
+            looks.append(name)
+            return super().__getattribute__(name)
+
+    parts = objects.Parts("nodes", [Watched(None, f"node.structural.{k}.", k, "", "structural", "static") for k in range(1000)])
+    looks.clear()
+    assert [part.label for part in parts.values()] == list(range(1000)) and len(looks) <= 3000
 
 
 # ---------------------------------------------------------------- histories, what if

@@ -82,7 +82,7 @@ def _new_id() -> str:
 def grant(identity: str, right: str, ports: Iterable[str] = ()) -> pb.Grant:
     """Lets `identity` ("token:NAME", "cert:…" or "*") use a simulation: "observe", "couple" (to `ports`, or all) or "control"."""
     value: Any = choice(pb.Right, "RIGHT_", right, "right")
-    return pb.Grant(identity=identity, right=value, ports=ports)
+    return pb.Grant(identity=identity, right=value, ports=each_name(ports, "ports"))
 
 
 def units(length: str, *, time: str, mass: Optional[str] = None, force: Optional[str] = None) -> common_pb2.UnitSystem:
@@ -95,6 +95,25 @@ def checked_units(system: Any) -> Optional[common_pb2.UnitSystem]:
     if system is not None and not isinstance(system, common_pb2.UnitSystem):
         raise TypeError(f'`units` must be a system made by mbcosim.units, mbcosim.units("mm", mass="t", time="s") say, got {system!r}')
     return system
+
+
+def _made(given: Iterable[Any], kind: type, expected: str) -> list_of[Any]:
+    """`given` as a list of messages of a `kind`; TypeError, which says what is `expected`, for anything else."""
+    try:
+        found = list(given)
+    except TypeError:  # one by itself
+        found = [None]
+    if not all(isinstance(each, kind) for each in found):
+        raise TypeError(f"{expected}, got {given!r}")
+    return found
+
+
+def _ports(given: Iterable[coupling_types_pb2.PortDefinition]) -> list_of[coupling_types_pb2.PortDefinition]:
+    return _made(given, coupling_types_pb2.PortDefinition, '`ports` must be a list of ports, [mbcosim.structural_port("tip", nodes=[2])] say')
+
+
+def _grants(given: Iterable[pb.Grant]) -> list_of[pb.Grant]:
+    return _made(given, pb.Grant, '`grants` must be a list of grants, [mbcosim.grant("*", "observe")] say')
 
 
 def _symbol(value: Symbol) -> pb.SymbolValue:
@@ -233,7 +252,7 @@ class ServerCalls(Generic[SimulationKind]):
         header.options.request_id = _new_id()
         header.options.protocol.CopyFrom(protocol())
         header.options.display_name = name
-        header.options.ports.extend(ports)
+        header.options.ports.extend(_ports(ports))
         header.options.non_convergence_policy = _policy(policy)
         if minimum_step is not None:
             header.options.minimum_step_size = minimum_step
@@ -242,7 +261,7 @@ class ServerCalls(Generic[SimulationKind]):
         header.options.optional_ports = optional_ports
         if results:
             header.options.results.CopyFrom(_result_options(results, results_quota))
-        header.options.grants.extend(grants)
+        header.options.grants.extend(_grants(grants))
         for symbol, value in (symbols or {}).items():
             header.options.symbols[symbol].CopyFrom(_symbol(value))
         header.options.durability = choice(pb.Durability, "DURABILITY_", durability, "durability")
@@ -528,6 +547,8 @@ class SimulationCalls(Generic[SnapshotKind]):
               timeout: Optional[float]) -> Calls[None]:
         request.simulation = self.name
         if until is not None:
+            if not isinstance(until, Condition):
+                raise TypeError(f'`until` must be a mbcosim.Condition, Condition("time", ">", 1.0) say, got {until!r}; run_until takes a time')
             request.until.handle, = yield from self._handles([until.variable], timeout)
             request.until.element, request.until.threshold = until.element, until.threshold
             request.until.comparison = pick(_COMPARISONS, until.comparison, "comparison")
@@ -636,8 +657,8 @@ class SimulationCalls(Generic[SnapshotKind]):
              ports: Iterable[coupling_types_pb2.PortDefinition] = (), results: Results = False, results_quota: Optional[int] = None,
              optional_ports: bool = False, timeout: Optional[float] = None) -> Calls[Any]:
         """A new simulation at a saved state or the current one, sharing the model. `results`, `optional_ports` as in Server.load_bundle; files of
-        its own."""
-        options = pb.CreateOptions(display_name=name, ports=ports, optional_ports=optional_ports, request_id=_new_id(), protocol=protocol())
+        its own. Its ports are the deck's and `ports`; those that this one was given, and all peers, stay here."""
+        options = pb.CreateOptions(display_name=name, ports=_ports(ports), optional_ports=optional_ports, request_id=_new_id(), protocol=protocol())
         if results:
             options.results.CopyFrom(_result_options(results, results_quota))
         request = pb.ForkSimulationRequest(simulation=self.name, snapshot=snapshot.name if snapshot else None, options=options)
@@ -743,7 +764,7 @@ class SimulationCalls(Generic[SnapshotKind]):
             request.minimum_step_size = minimum_step
         if grants is not None:
             request.grants.SetInParent()
-            request.grants.grants.extend(grants)
+            request.grants.grants.extend(_grants(grants))
         self.info = (yield Call("Simulations/UpdateSimulation", request, timeout, repeatable=True)).simulation
         return self.info
 

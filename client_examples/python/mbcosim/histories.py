@@ -247,7 +247,7 @@ class Histories:
     def what_if(self: Any, cases: Mapping[str, Mapping[str, Input]], outputs: Union[None, str, Iterable[str]] = None,
                 **options: Any) -> dict[str, History]:
         """The histories that different inputs would lead to from the present state, by the names of the cases; this simulation stays where
-        it is. Options as of `simulate`.
+        it is. Options as of `simulate`. Each case is a fork: without the loads of peers, and a port of the deck waits for one in vain.
 
             simulation.what_if({"open": {"valve": 1.0}, "closed": {"valve": 0.0}}, ["node.structural.8.X"], until=2.0)
         """
