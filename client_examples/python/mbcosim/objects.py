@@ -119,7 +119,8 @@ class Parts(Mapping[Key, Part]):
         self._what, self._parts = what, parts
         self._called: dict[Key, list[Part]] = {}
         for part in parts:
-            for key in (part.label, part.name, (part.family, part.label)):
+            keys: tuple[Key, ...] = (part.label, part.name, (part.family, part.label))
+            for key in keys:
                 self._called.setdefault(key, []).append(part)
 
     def __getitem__(self, key: Key) -> Part:
