@@ -3,6 +3,7 @@ import asyncio
 import contextlib
 import functools
 import os
+import pydoc
 import signal
 import socket
 import subprocess
@@ -472,6 +473,12 @@ def test_lists_of_ports_and_grants_and_conditions_of_another_kind_are_told(serve
         mbcosim.grant("token:ann", "couple", "tip")
     with pytest.raises(TypeError, match="`until` must be a mbcosim.Condition, .* got 1.0; run_until takes a time"):
         swing.step(until=1.0)
+
+
+@pytest.mark.parametrize("of", [mbcosim.Server, mbcosim.Simulation, mbcosim.Snapshot, mbcosim.aio.Server, mbcosim.aio.Simulation])
+def test_help_tells_what_a_call_gives(of):
+    text = pydoc.plain(pydoc.render_doc(of))
+    assert "timeout: 'Optional[float]' = 30.0) -> '" in text and "-> 'Calls[" not in text
 
 
 def test_one_of_many_parts_is_found_without_a_look_at_each():

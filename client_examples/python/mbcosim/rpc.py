@@ -4,6 +4,7 @@ from __future__ import annotations
 import contextlib
 import dataclasses
 import functools
+import inspect
 import math
 import queue
 import threading
@@ -105,9 +106,17 @@ def runs_calls(drive: Callable[[Any], Any]) -> Callable[[_Class], _Class]:
         for base in reversed(cls.__mro__[1:]):
             for name, function in vars(base).items():
                 if getattr(function, "is_call", False) and name not in vars(cls):
-                    setattr(cls, name, functools.wraps(function)(drive(function)))
+                    method = functools.wraps(function)(drive(function))
+                    method.__signature__ = _signature(function)
+                    setattr(cls, name, method)
         return cls
     return decorate
+
+
+def _signature(function: Callable[..., Calls[Any]]) -> inspect.Signature:
+    """For `help`: with the result in place of the Calls."""
+    own = inspect.signature(function)
+    return own.replace(return_annotation=own.return_annotation.removeprefix("Calls[").removesuffix("]"))
 
 
 def fill_duration(out: Any, seconds: float, field: str) -> None:
