@@ -3,6 +3,7 @@ import asyncio
 import contextlib
 import functools
 import os
+import pathlib
 import pydoc
 import signal
 import socket
@@ -362,6 +363,7 @@ def test_parts_are_found_by_label_by_name_and_by_family(server):
         assert list(top.position) == list(simulation["node.structural.1.X"])
         assert top["angular_velocity"] == pytest.approx(simulation["node.structural.1.Omega"])
         assert {"position", "XP", "load"} <= set(dir(top))
+        assert ", step 0, t = 0 (deck unit of time), " in repr(simulation.snapshot())
         assert repr(top).startswith('<dynamic node 1 "top", t = 0 (deck unit of time)>\n  X[3] [deck unit of length], global: position')
 
 
@@ -473,6 +475,12 @@ def test_lists_of_ports_and_grants_and_conditions_of_another_kind_are_told(serve
         mbcosim.grant("token:ann", "couple", "tip")
     with pytest.raises(TypeError, match="`until` must be a mbcosim.Condition, .* got 1.0; run_until takes a time"):
         swing.step(until=1.0)
+
+
+def test_states_and_decks_that_are_no_bytes_are_told(server, swing):
+    for call, what in ((swing.import_state, "a saved state"), (server.import_checkpoint, "a saved state"), (server.load_text, "the file 'deck' of a bundle")):
+        with pytest.raises(TypeError, match=f"{what} must be bytes, got a PosixPath"):
+            call(pathlib.Path("state"))
 
 
 @pytest.mark.parametrize("of", [mbcosim.Server, mbcosim.Simulation, mbcosim.Snapshot, mbcosim.aio.Server, mbcosim.aio.Simulation])

@@ -66,6 +66,12 @@ def checked(files: Mapping[str, bytes]) -> Mapping[str, bytes]:
     return {name: bytes(data) for name, data in files.items()}
 
 
+def check_state(data: object) -> None:
+    """TypeError for a saved state that is no bytes."""
+    if not isinstance(data, bytes):
+        raise TypeError(f"a saved state must be bytes, got a {type(data).__name__}")
+
+
 def _chunks(files: Mapping[str, bytes]) -> Iterator[common_pb2.FileChunk]:
     for name, data in files.items():
         for start in range(0, max(len(data), 1), CHUNK_BYTES):

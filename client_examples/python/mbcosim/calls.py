@@ -204,7 +204,7 @@ class ServerCalls(Generic[SimulationKind]):
     def load_text(self, /, text: Union[str, bytes], **options: Any) -> Calls[SimulationKind]:
         """Creates a simulation from a deck given as text, or as the bytes of its file. For options see load_bundle."""
         data = text.encode() if isinstance(text, str) else text
-        return (yield from self._create(pb.UploadHeader(bundle_main_file="deck"), {"deck": data}, **options))
+        return (yield from self._create(pb.UploadHeader(bundle_main_file="deck"), bundle.checked({"deck": data}), **options))
 
     @call
     def load_bundle(self, /, main: str, files: Mapping[str, bytes], **options: Any) -> Calls[SimulationKind]:
@@ -337,6 +337,7 @@ class ServerCalls(Generic[SimulationKind]):
     @call
     def import_checkpoint(self, data: bytes, *, name: Optional[str] = None, timeout: Optional[float] = None) -> Calls[SimulationKind]:
         """A new simulation from what `Simulation.export_checkpoint` gave, here or on another server. It lives on afterwards."""
+        bundle.check_state(data)
         header = pb.ImportCheckpointHeader(request_id=_new_id(), display_name=name)
 
         def messages() -> Iterator[pb.ImportCheckpointRequest]:
@@ -639,6 +640,7 @@ class SimulationCalls(Generic[SnapshotKind]):
     @call
     def import_state(self, data: bytes, *, restore: bool = True, name: str = "", timeout: Optional[float] = None) -> Calls[SnapshotKind]:
         """Adds a saved state from bytes and, with `restore`, goes to it."""
+        bundle.check_state(data)
         header = pb.ImportSnapshotHeader(simulation=self.name, display_name=name, restore=restore, request_id=_new_id())
 
         def messages() -> Iterator[pb.ImportSnapshotRequest]:
@@ -799,7 +801,8 @@ class SnapshotCalls:
         self.size_bytes = info.size_bytes
 
     def __repr__(self) -> str:
-        return f"<{type(self).__name__} {self.display_name or self.name}, step {self.step}, t = {self.time:g} s, {self.size_bytes} bytes>"
+        time = f"{self.time:g} {after_number(self._simulation.time_unit)}"
+        return f"<{type(self).__name__} {self.display_name or self.name}, step {self.step}, t = {time}, {self.size_bytes} bytes>"
 
     @call
     def restore(self, *, timeout: Optional[float] = USUAL) -> Calls[None]:
