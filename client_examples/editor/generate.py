@@ -25,8 +25,8 @@ def pattern(words):
 
 
 def argument(words, scope):
-    """Words that stand between commas."""
-    return {"name": scope, "match": rf"(?i)(?<=[:,])\s*(?:{pattern(words)})\s*(?=[,;])"}
+    """Words that stand between commas, the first one behind the end of a line; editors match line by line."""
+    return {"name": scope, "match": rf"(?i)(?:^|(?<=[:,]))\s*(?:{pattern(words)})\s*(?=[,;])"}
 
 
 def head(words, scope):

@@ -1,5 +1,6 @@
 #!/usr/bin/env python3
-"""The editor grammar colours the statements of the example decks: every statement's first word is known to it.
+"""The editor grammar colours the statements of the example decks: every statement's first word is known to it, and words between commas at the
+beginning of a line as well as within it.
 
 usage: grammar_on_decks.py CLIENT_EXAMPLES
 """
@@ -23,10 +24,15 @@ def main():
     with open(os.path.join(folder, "editor", "syntaxes", "mbcosim.tmLanguage.json"), encoding="utf-8") as file:
         grammar = json.load(file)
     heads = [re.compile(p["match"].replace("(?:^|(?<=;))", "")) for p in grammar["patterns"] if "captures" in p]
+    arguments = [re.compile(p["match"]) for p in grammar["patterns"] if p.get("match", "").endswith("(?=[,;])")]
     count, unknown = 0, []
     for path in sorted(glob.glob(os.path.join(folder, "models", "*.mbd"))):
         with open(path, encoding="utf-8") as file:
-            for statement in statements(file.read()):
+            text = file.read()
+            for line in text.splitlines():
+                if any(argument.match("," + line, 1) and not argument.match(line) for argument in arguments):
+                    unknown.append(f"{os.path.basename(path)}: {line.strip()[:60]}")
+            for statement in statements(text):
                 line = " ".join(statement.split()) + ";"
                 if line == ";":
                     continue
