@@ -3,7 +3,7 @@
 // usage: spring_peer ADDRESS DECK NODE [STEPS]
 //        spring_peer ADDRESS --join SIMULATION PORT [--shared-memory]
 //
-// e.g. spring_peer unix:/tmp/mbcosim.sock tumbling.mbd 1; the second form takes part in a
+// e.g. spring_peer unix:/tmp/mbcosim.sock rigid_body.mbd 1; the second form takes part in a
 // simulation that another client steps.
 #include <cstdio>
 #include <cstdlib>
