@@ -1,4 +1,5 @@
 """Listeners, health, reflection, credentials, configuration."""
+import asyncio
 import contextlib
 import os
 import re
@@ -13,6 +14,7 @@ import pytest
 
 import decks
 import mbcosim
+import mbcosim.aio
 from conftest import BIN, TIME_FACTOR, Daemon, wait_for
 
 DAEMON = os.path.join(BIN, "mbcosimd")
@@ -232,6 +234,22 @@ def test_loopback_tcp_on_request(start_daemon):
     port = daemon.log().split("listening on 127.0.0.1:")[1].split()[0]
     with mbcosim.connect(f"127.0.0.1:{port}") as server, server.load_text(decks.body()) as simulation:
         assert simulation.step().step == 1
+
+
+def test_no_proxy_of_the_environment_is_asked_for_this_machine(start_daemon, monkeypatch):
+    daemon = start_daemon("--listen", "127.0.0.1:0", "--insecure")
+    wait_for(lambda: "127.0.0.1:" in daemon.log())
+    port = daemon.log().split("listening on 127.0.0.1:")[1].split()[0]
+    monkeypatch.setenv("http_proxy", "http://127.0.0.1:9")
+    for name in ("no_proxy", "no_grpc_proxy"):
+        monkeypatch.delenv(name, raising=False)
+
+    async def awaited():
+        async with mbcosim.aio.connect(f"localhost:{port}") as server:
+            return await server.info()
+
+    with mbcosim.connect(f"127.0.0.1:{port}") as server:
+        assert server.info().version == asyncio.run(awaited()).version
 
 
 def test_tokens_roles_and_owners(start_daemon, tmp_path):

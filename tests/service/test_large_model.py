@@ -22,8 +22,6 @@ def default_limits(monkeypatch):
     """The Python library without limits of its own on what it receives: 4 MiB for a message."""
     kept = [option for option in mbcosim.rpc.CHANNEL_OPTIONS if option[0] != "grpc.max_receive_message_length"]
     monkeypatch.setattr(mbcosim.rpc, "CHANNEL_OPTIONS", kept)
-    monkeypatch.setattr(mbcosim.client, "CHANNEL_OPTIONS", kept)
-    monkeypatch.setattr(mbcosim.aio, "CHANNEL_OPTIONS", kept)
 
 
 def look_at(described, geometry, linear, x):

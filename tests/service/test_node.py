@@ -66,6 +66,20 @@ def test_the_example_follows_the_pendulum(node_client, daemon):
     assert len(lines) == 5 and lines[-1].startswith("2.500 s: ")
 
 
+def test_no_proxy_of_the_environment_is_asked_for_this_machine(node_client, start_daemon, monkeypatch):
+    daemon = start_daemon("--listen", "127.0.0.1:0", "--insecure")
+    wait_for(lambda: "127.0.0.1:" in daemon.log())
+    port = daemon.log().split("listening on 127.0.0.1:")[1].split()[0]
+    monkeypatch.setenv("http_proxy", "http://127.0.0.1:9")
+    for name in ("no_proxy", "no_grpc_proxy"):
+        monkeypatch.delenv(name, raising=False)
+    ask = f"""import {{ call, connect }} from "./mbcosim.mjs";
+              const server = connect("127.0.0.1:{port}");
+              console.log((await call(server, server.simulations, "GetServerInfo", {{}}, 10)).version);
+              server.close();"""
+    assert run(["node", "--input-type=module", "--eval", ask], node_client, daemon).strip()
+
+
 def test_the_lock_file_names_no_host():
     with open(os.path.join(ROOT, "client_examples", "node", "package-lock.json"), encoding="utf-8") as file:
         assert "http" not in "".join(line for line in file if "resolved" in line or "registry" in line)

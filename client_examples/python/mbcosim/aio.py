@@ -31,7 +31,7 @@ from .calls import Condition, ServerCalls, SimulationCalls, SnapshotCalls, StepR
 from .coupling import Answer, open_stream
 from .errors import Busy, Error, PreconditionFailed, StepFailed, TimedOut, Unavailable, cancelled_here, from_rpc_error, translated
 from .histories import History
-from .rpc import (CHANNEL_OPTIONS, PARTING, USUAL, Address, Awaiting, Bound, Call, Calls, Open, Retries, cancelling, checked_timeout, metadata,
+from .rpc import (PARTING, USUAL, Address, Awaiting, Bound, Call, Calls, Open, Retries, cancelling, channel_options, checked_timeout, metadata,
                   parting, runs_calls)
 from .simulation import subscribe_request
 from .stepping import AwaitedSharedStream, AwaitedStepLine, status_of
@@ -279,8 +279,8 @@ class Server(Awaiting, ServerCalls[Simulation]):
     _simulation_class = Simulation
 
     def __init__(self, address: str, token: Optional[str], credentials: Any, reconnect: float) -> None:
-        channel = (grpc.aio.secure_channel(address, credentials, CHANNEL_OPTIONS) if credentials
-                   else grpc.aio.insecure_channel(address, CHANNEL_OPTIONS))
+        options = channel_options(address)
+        channel = grpc.aio.secure_channel(address, credentials, options) if credentials else grpc.aio.insecure_channel(address, options)
         self.address = address
         self._connection = Connection(channel, token, reconnect)
         self.metadata = self._connection.metadata

@@ -14,7 +14,7 @@ from . import access
 from .calls import ServerCalls
 from .errors import Unavailable, translated
 from .events import Events
-from .rpc import CHANNEL_OPTIONS, PARTING, USUAL, Blocking, Connection, blocking, runs_calls
+from .rpc import PARTING, USUAL, Blocking, Connection, blocking, channel_options, runs_calls
 from .simulation import Simulation
 
 Self = TypeVar("Self", bound="Server")
@@ -71,8 +71,8 @@ class Server(Blocking, ServerCalls[Simulation]):
     _simulation_class = Simulation
 
     def __init__(self, address: str, token: Optional[str] = None, credentials: Any = None, reconnect: float = 0.0) -> None:
-        channel = (grpc.secure_channel(address, credentials, CHANNEL_OPTIONS) if credentials
-                   else grpc.insecure_channel(address, CHANNEL_OPTIONS))
+        options = channel_options(address)
+        channel = grpc.secure_channel(address, credentials, options) if credentials else grpc.insecure_channel(address, options)
         self.address = address
         self._connection = Connection(channel, token, reconnect)
         self.metadata = self._connection.metadata

@@ -7,6 +7,7 @@ import functools
 import inspect
 import math
 import queue
+import re
 import threading
 import time
 from collections.abc import Callable, Coroutine, Generator, Iterator
@@ -44,6 +45,12 @@ CHANNEL_OPTIONS = [
     ("grpc.initial_reconnect_backoff_ms", 200),
     ("grpc.max_reconnect_backoff_ms", 2_000),
 ]
+_THIS_MACHINE = re.compile(r"(localhost|127\.[\d.]+|\[::1\]):\d+")
+
+
+def channel_options(address: str) -> list[tuple[str, int]]:
+    """Of a channel to `address`: no proxy of the environment ($http_proxy) can stand between this machine and itself."""
+    return CHANNEL_OPTIONS + [("grpc.enable_http_proxy", 0)] if _THIS_MACHINE.fullmatch(address) else CHANNEL_OPTIONS
 
 
 @dataclasses.dataclass
