@@ -60,6 +60,13 @@ def test_what_fails_is_an_error_with_its_reason(daemon):
     assert called("http://127.0.0.1:1/", "Simulations/Step", "struct()").startswith("mbcosim:connection curl: (7) Failed to connect")
 
 
+def test_no_proxy_of_the_environment_is_asked_for_this_machine(daemon, monkeypatch):
+    monkeypatch.setenv("http_proxy", "http://127.0.0.1:9")
+    for name in ("no_proxy", "NO_PROXY"):
+        monkeypatch.delenv(name, raising=False)
+    assert called(daemon[1], "Simulations/Step", "struct('simulation', '7')").startswith("mbcosim:not_found")
+
+
 def test_a_request_may_be_large_and_the_temporary_folder_have_blanks(daemon, tmp_path):
     folder = tmp_path / "with blanks"
     folder.mkdir()
