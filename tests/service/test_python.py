@@ -12,6 +12,7 @@ import sys
 import tempfile
 import threading
 import time
+import types
 
 import numpy as np
 import pytest
@@ -570,6 +571,12 @@ def test_a_history_is_a_table(swing, tmp_path):
             continue
         table = convert()
         assert "node.structural.2.X[1]" in table if module == "pandas" else table["node.structural.2.X"].attrs["units"] == "deck unit of length"
+
+
+def test_the_time_among_the_outputs_is_the_coordinate_of_a_data_set(swing, monkeypatch):
+    """xarray, which few machines have here, refuses a name that is both."""
+    monkeypatch.setitem(sys.modules, "xarray", types.SimpleNamespace(Dataset=lambda data, coords, attrs: (set(data), set(coords))))
+    assert swing.simulate(["node.structural.2.X", "time"], steps=3).to_xarray() == ({"node.structural.2.X"}, {"time"})
 
 
 def test_a_snapshot_as_a_block_leaves_the_state_as_it_was(swing):

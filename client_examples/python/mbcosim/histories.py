@@ -89,7 +89,7 @@ class History(Mapping[str, Array]):
         """An xarray.Dataset with the dimension `time`; units as attributes."""
         xarray = needed("xarray", "a data set")
         data = {name: (["time", *(f"{name} {axis + 1}" for axis in range(values.ndim - 1))], values, {"units": self.units[name]})
-                for name, values in self.items()}
+                for name, values in self.items() if name != "time"}  # which is the coordinate
         return xarray.Dataset(data, coords={"time": ("time", self.time, {"units": self.time_unit})}, attrs={"title": self.title})
 
     def save(self, path: Union[str, "os.PathLike[str]"]) -> None:
