@@ -764,6 +764,19 @@ def test_an_empty_picture_is_refused(swing):
             swing.state_space(inputs, outputs).plot_bode()
 
 
+def test_a_film_takes_a_path_and_tells_what_it_cannot_be(swing, tmp_path, monkeypatch):
+    animation = pytest.importorskip("matplotlib.animation")
+    monkeypatch.setattr(animation.writers, "is_available", lambda _: False)
+    history = swing.simulate(until=0.2)
+    history.animate(save=tmp_path / "film.gif", frames_per_second=5)
+    history.animate(save=tmp_path / "frame%d.png", seconds=0.1, frames_per_second=10)
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["film.gif", "frame0.png", "frame1.png"]
+    with pytest.raises(ValueError, match="without ffmpeg films are GIFs, .* got 'film.mp4'"):
+        history.animate(save="film.mp4")
+    with pytest.raises(ValueError, match="lines: no choice is called 9; choose from 1, 2"):
+        history.animate(lines=[(1, 9)])
+
+
 def test_a_bode_diagram_of_many_has_its_names_beside_it_and_no_noise(server, tmp_path):
     pyplot = pytest.importorskip("matplotlib.pyplot")
     pyplot.switch_backend("Agg")

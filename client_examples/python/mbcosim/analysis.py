@@ -8,6 +8,7 @@ from typing import Any, Optional, Union
 import numpy as np
 import numpy.typing as npt
 
+from .access import Path
 from .histories import Array
 from .words import UnknownName, frequency_unit, needed, remedy, seconds_in
 
@@ -69,12 +70,12 @@ class StateSpace:
         columns, rows = _places("input", chosen_in, self.inputs), _places("output", chosen_out, self.outputs)
         return StateSpace(self.A, self.B[:, columns], self.C[rows], self.D[np.ix_(rows, columns)], chosen_in, chosen_out, self.time_unit)
 
-    def plot_bode(self, frequencies_hz: Optional[npt.ArrayLike] = None, *, save: Optional[str] = None) -> Any:
+    def plot_bode(self, frequencies_hz: Optional[npt.ArrayLike] = None, *, save: Optional[Path] = None) -> Any:
         """Bode diagram; see plots.plot_bode."""
         from . import plots
         return plots.plot_bode(self, frequencies_hz, save=save)
 
-    def plot_root_locus(self, gains: npt.ArrayLike, *, save: Optional[str] = None) -> Any:
+    def plot_root_locus(self, gains: npt.ArrayLike, *, save: Optional[Path] = None) -> Any:
         """Root locus; see plots.plot_root_locus."""
         from . import plots
         return plots.plot_root_locus(self, gains, save=save)

@@ -1,7 +1,6 @@
 """Values over time with their units: what Simulation.simulate returns."""
 from __future__ import annotations
 
-import os
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING, Any, Optional, Union
 
@@ -10,6 +9,7 @@ import numpy.typing as npt
 
 from mbcosim.v1 import simulations_pb2 as pb
 
+from .access import Path
 from .calls import SimulationCalls, StepResult, numbers_of
 from .errors import StepFailed, bad_argument
 from .rpc import USUAL
@@ -92,7 +92,7 @@ class History(Mapping[str, Array]):
                 for name, values in self.items() if name != "time"}  # which is the coordinate
         return xarray.Dataset(data, coords={"time": ("time", self.time, {"units": self.time_unit})}, attrs={"title": self.title})
 
-    def save(self, path: Union[str, "os.PathLike[str]"]) -> None:
+    def save(self, path: Path) -> None:
         """Writes a table with one column for each number, units in its heading."""
         columns = self.columns()
         heads = [f"time [{self.time_unit}]"]
@@ -101,13 +101,13 @@ class History(Mapping[str, Array]):
             heads.append(f"{name} [{unit}]" if unit else name)
         np.savetxt(path, np.column_stack([self.time, *columns.values()]), delimiter=",", header=",".join(heads), comments="")
 
-    def plot(self, names: Union[None, str, Iterable[str]] = None, *, axes: Any = None, save: Optional[str] = None) -> Any:
+    def plot(self, names: Union[None, str, Iterable[str]] = None, *, axes: Any = None, save: Optional[Path] = None) -> Any:
         """Draws variables over time, one row of axes for each unit; see plots.plot_history."""
         from . import plots
         return plots.plot_history(self, names, axes=axes, save=save)
 
     def animate(self, *, lines: Any = None, view: Any = "auto", seconds: Optional[float] = None, frames_per_second: int = 25,
-                save: Optional[str] = None) -> Any:
+                save: Optional[Path] = None) -> Any:
         """Moves the points whose positions the history has; see plots.animate_history."""
         from . import plots
         return plots.animate_history(self, lines=lines, view=view, seconds=seconds, frames_per_second=frames_per_second, save=save)

@@ -8,8 +8,9 @@ from typing import TYPE_CHECKING, Any, Optional, Union
 import numpy as np
 import numpy.typing as npt
 
+from .access import Path
 from .histories import Array, History
-from .words import after_number, frequency_unit, needed, seconds_in
+from .words import after_number, frequency_unit, needed, pick, seconds_in
 
 if TYPE_CHECKING:
     from .analysis import Modes, StateSpace
@@ -18,7 +19,7 @@ _VIEWS = {"xy": (0, 1), "xz": (0, 2), "yz": (1, 2)}
 _XYZ = ("x", "y", "z")
 
 
-def pyplot(save: Optional[str]) -> Any:
+def pyplot(save: Optional[Path]) -> Any:
     """matplotlib.pyplot; without a display where the picture goes to a file."""
     matplotlib = needed("matplotlib", "a picture")
     if save is not None and not os.environ.get("MPLBACKEND") and not os.environ.get("DISPLAY") and not os.environ.get("WAYLAND_DISPLAY"):
@@ -26,7 +27,7 @@ def pyplot(save: Optional[str]) -> Any:
     return needed("matplotlib.pyplot", "a picture", "matplotlib")
 
 
-def _finish(figure: Any, save: Optional[str]) -> Any:
+def _finish(figure: Any, save: Optional[Path]) -> Any:
     if save is not None:
         figure.savefig(save, dpi=120)
     return figure
@@ -40,7 +41,7 @@ def component_names(name: str, values: Array) -> list[str]:
     return [f"{name} {_XYZ[k] if count == 3 else k + 1}" for k in range(count)]
 
 
-def plot_history(history: History, names: Union[None, str, Iterable[str]] = None, *, axes: Any = None, save: Optional[str] = None) -> Any:
+def plot_history(history: History, names: Union[None, str, Iterable[str]] = None, *, axes: Any = None, save: Optional[Path] = None) -> Any:
     """Draws variables over time: one row of axes for each unit, all numbers of a vector.
 
     names  of variables; default: all. `"node.structural.2.X[3]"` is one number of a vector, counted as in decks.
@@ -97,7 +98,8 @@ class _Scene:
                  trails: bool) -> None:
         self._positions, self._unit = positions, unit
         self._plane = _plane(positions, view)
-        self._lines = [[list(labels).index(label) for label in line] for line in lines]
+        places = {label: k for k, label in enumerate(labels)}
+        self._lines = [[pick(places, label, "lines") for label in line] for line in lines]
         space = self._plane is None
         self.figure = plt.figure(figsize=(6.4, 5.2))
         self.axes = self.figure.add_subplot(projection="3d" if space else None)
@@ -148,24 +150,28 @@ def _plane(positions: Array, view: str) -> Optional[tuple[int, int]]:
     return first, second
 
 
-def _play(plt: Any, scene: _Scene, titles: Sequence[str], frames_per_second: int, save: Optional[str]) -> Any:
+def _play(plt: Any, scene: _Scene, titles: Sequence[str], frames_per_second: int, save: Optional[Path]) -> Any:
     animation = needed("matplotlib.animation", "an animation", "matplotlib")
-    if save is not None and "%" in save:  # a picture for each frame
+    file = None if save is None else os.fspath(save)
+    if file is not None and "%" in file:  # a picture for each frame
         for k, title in enumerate(titles):
             scene.show(k, title)
-            scene.figure.savefig(save % k, dpi=100)
+            scene.figure.savefig(file % k, dpi=100)
         plt.close(scene.figure)
         return None
     film = animation.FuncAnimation(scene.figure, lambda k: scene.show(k, titles[k]), frames=len(titles), interval=1000 / frames_per_second)
-    if save is not None:
+    if file is not None:
         needed("PIL", "a GIF", "pillow")
-        film.save(save, writer=animation.PillowWriter(fps=frames_per_second) if save.endswith(".gif") else None)
+        if not file.endswith(".gif") and not animation.writers.is_available("ffmpeg"):
+            plt.close(scene.figure)
+            raise ValueError(f"without ffmpeg films are GIFs, or pictures for each frame: expected a name like 'film.gif' or 'frame%03d.png', got {file!r}")
+        film.save(file, writer=animation.PillowWriter(fps=frames_per_second) if file.endswith(".gif") else None)
         plt.close(scene.figure)
     return film
 
 
 def animate_history(history: History, *, lines: Optional[Iterable[Sequence[int]]] = None, view: str = "auto",
-                    seconds: Optional[float] = None, frames_per_second: int = 25, save: Optional[str] = None) -> Any:
+                    seconds: Optional[float] = None, frames_per_second: int = 25, save: Optional[Path] = None) -> Any:
     """Moves the nodes whose positions the history has, with the paths that they take.
 
     lines    labels of nodes that are joined by a line: [(1, 2, 3), (3, 4)]; default: all, in the order of their labels
@@ -185,7 +191,7 @@ def animate_history(history: History, *, lines: Optional[Iterable[Sequence[int]]
 
 
 def animate_mode(modes: Modes, number: int, *, lines: Optional[Iterable[Sequence[int]]] = None, view: str = "auto", scale: float = 0.15,
-                 frames: int = 32, frames_per_second: int = 16, save: Optional[str] = None) -> Any:
+                 frames: int = 32, frames_per_second: int = 16, save: Optional[Path] = None) -> Any:
     """Swings the model in one of its modes (counted from 1), enlarged: the largest displacement is `scale` of the model's size. For `lines`,
     `view`, `save` see animate_history."""
     plt = pyplot(save)
@@ -217,7 +223,7 @@ def _curves(system: StateSpace, response: npt.NDArray[np.complex128]) -> list[tu
     return [(i, j) for i, j in np.argwhere(sizes > least).tolist()]
 
 
-def plot_bode(system: StateSpace, frequencies_hz: Optional[npt.ArrayLike] = None, *, save: Optional[str] = None) -> Any:
+def plot_bode(system: StateSpace, frequencies_hz: Optional[npt.ArrayLike] = None, *, save: Optional[Path] = None) -> Any:
     """Magnitude and phase of every output over every input that it answers, in the color of the input and the dashes of the output; default: two
     decades about the poles. Returns the figure."""
     plt = pyplot(save)
@@ -243,7 +249,7 @@ def plot_bode(system: StateSpace, frequencies_hz: Optional[npt.ArrayLike] = None
     return _finish(figure, save)
 
 
-def plot_root_locus(system: StateSpace, gains: npt.ArrayLike, *, save: Optional[str] = None) -> Any:
+def plot_root_locus(system: StateSpace, gains: npt.ArrayLike, *, save: Optional[Path] = None) -> Any:
     """Poles of the loop u = -k y of one input and one output, for all gains k. Returns the figure."""
     plt = pyplot(save)
     poles = system.root_locus(gains)

@@ -60,7 +60,7 @@ def choice(kind: Any, prefix: str, word: Optional[str], what: str) -> Any:
     raise ValueError(f"{what}: no choice is called {word!r}; choose from {listed(words)}")
 
 
-def pick(choices: dict[str, Any], word: str, what: str) -> Any:
+def pick(choices: dict[Any, Any], word: object, what: str) -> Any:
     """Value of a word of a table."""
     try:
         return choices[word]
