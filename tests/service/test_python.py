@@ -111,6 +111,20 @@ def test_a_private_daemon_that_is_stopped_delays_nobody_for_long():
     assert time.monotonic() - begin < 3 + TIME_FACTOR
 
 
+@pytest.mark.parametrize("name", ["with blanks", "a#b?c", "100%25", "one,two", "ä"])
+def test_a_private_daemon_lives_in_any_folder(monkeypatch, name):
+    async def awaited():
+        async with mbcosim.aio.connect(server.address) as other:
+            return await other.info()
+
+    with tempfile.TemporaryDirectory(dir="/tmp") as top:
+        os.mkdir(f"{top}/{name}")
+        monkeypatch.setattr(tempfile, "tempdir", f"{top}/{name}")
+        with mbcosim.local() as server:
+            assert server.info().version == asyncio.run(awaited()).version
+            assert ("," in name) != server.address.startswith(f"unix:{top}/{name}/")
+
+
 def test_a_private_daemon_that_cannot_start_says_why():
     with pytest.raises(mbcosim.Unavailable, match="ended with .* before it served: (.|\n)*--no-such-option"):
         mbcosim.local("--no-such-option")
@@ -153,7 +167,7 @@ def test_connect_without_a_daemon_says_so_at_once_and_how_to_start_one(address, 
     ("::1", "has colons in its host: expected [HOST]:PORT"), ("/run/mbcosim.sock", "is a path without `unix:` before it: say 'unix:/run/mbcosim.sock'"),
     ("http://localhost:8765/?token=x", "is that of a page, or of calls over HTTP: expected the one that the daemon listens on (--listen)"),
     ("tcp://localhost:1", "has a scheme that is not known here: expected"), ("unix:", "names no socket: expected unix:PATH"),
-    ("unix:/" + "x" * 107, "is too long: the path of a socket has at most 107 bytes, this one 108")])
+    ("unix:/one,two/s", "has a comma in the path of a socket"), ("unix:/" + "x" * 107, "is too long: the path of a socket has at most 107 bytes, this one 108")])
 def test_what_is_no_address_is_refused_with_what_is_wrong(address, fault, monkeypatch):
     async def awaited():
         async with mbcosim.aio.connect(address):

@@ -16,6 +16,7 @@ import shutil
 import socket
 import stat
 import time
+import urllib.parse
 from typing import Any, Optional, Union
 
 import grpc
@@ -102,10 +103,17 @@ def reached(address: Optional[str]) -> str:
     return chosen
 
 
+def target(address: str) -> str:
+    """`address` as gRPC takes it: for it `%`, `#` and `?` in the path of a socket mean something."""
+    return f"unix:{urllib.parse.quote(os.fsencode(address[len('unix:'):]))}" if address.startswith("unix:") else address
+
+
 def _fault_of_socket(path: str) -> Optional[str]:
     size = len(os.fsencode(path))
     if not path.strip("/"):
         return "names no socket: expected unix:PATH"
+    if "," in path:
+        return "has a comma in the path of a socket, for gRPC the beginning of another one: choose a path without"
     return f"is too long: the path of a socket has at most 107 bytes, this one {size}" if size > 107 else None
 
 

@@ -280,7 +280,8 @@ class Server(Awaiting, ServerCalls[Simulation]):
 
     def __init__(self, address: str, token: Optional[str], credentials: Any, reconnect: float) -> None:
         options = channel_options(address)
-        channel = grpc.aio.secure_channel(address, credentials, options) if credentials else grpc.aio.insecure_channel(address, options)
+        target = access.target(address)
+        channel = grpc.aio.secure_channel(target, credentials, options) if credentials else grpc.aio.insecure_channel(target, options)
         self.address = address
         self._connection = Connection(channel, token, reconnect)
         self.metadata = self._connection.metadata

@@ -72,7 +72,8 @@ class Server(Blocking, ServerCalls[Simulation]):
 
     def __init__(self, address: str, token: Optional[str] = None, credentials: Any = None, reconnect: float = 0.0) -> None:
         options = channel_options(address)
-        channel = grpc.secure_channel(address, credentials, options) if credentials else grpc.insecure_channel(address, options)
+        target = access.target(address)
+        channel = grpc.secure_channel(target, credentials, options) if credentials else grpc.insecure_channel(target, options)
         self.address = address
         self._connection = Connection(channel, token, reconnect)
         self.metadata = self._connection.metadata

@@ -50,7 +50,7 @@ class _Daemon:
     def __init__(self, program: str, options: tuple[str, ...]) -> None:
         self._starter = os.getpid()
         self.folder = pathlib.Path(tempfile.mkdtemp(prefix="mbcosim-"))
-        if len(os.fsencode(self.folder)) > 80:  # the name of a socket has at most 107 bytes
+        if len(os.fsencode(self.folder)) > 80 or "," in str(self.folder):  # of a socket's name: at most 107 bytes, no comma for gRPC
             self.folder.rmdir()
             self.folder = pathlib.Path(tempfile.mkdtemp(prefix="mbcosim-", dir="/tmp"))
         self.address = f"unix:{self.folder}/s"
