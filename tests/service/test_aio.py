@@ -2,6 +2,7 @@
 import asyncio
 import concurrent.futures
 import gc
+import multiprocessing
 
 import pytest
 
@@ -300,6 +301,25 @@ def test_the_motions_of_a_function_are_not_iterated_over(daemon):
             assert (await simulation.step()).step == 1
 
     run(daemon, body)
+
+
+def test_a_forked_process_is_told_that_it_has_no_asyncio(daemon):
+    """Its calls would wait for ever."""
+    async def ask():
+        async with mbcosim.aio.connect(daemon.address) as server:
+            return await server.info()
+
+    def child():
+        with pytest.raises(RuntimeError, match="does not survive a fork"):
+            asyncio.run(ask())
+
+    assert asyncio.run(ask()).version
+    process = multiprocessing.get_context("fork").Process(target=child)
+    process.start()
+    process.join(10 * TIME_FACTOR)
+    code = process.exitcode
+    process.kill()
+    assert code == 0
 
 
 def test_synchronous_peers_and_views(server):

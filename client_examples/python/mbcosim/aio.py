@@ -16,6 +16,7 @@ import asyncio
 import contextlib
 import functools
 import inspect
+import os
 import time
 from collections.abc import AsyncIterator, Awaitable, Callable, Iterable, Mapping
 from typing import Any, Optional, TypeVar, Union
@@ -65,21 +66,21 @@ async def connect(address: Optional[str] = None, *, token: Optional[str] = None,
 
 
 @functools.cache
-def _keep_grpc() -> None:
-    """Keeps gRPC's runtime for asyncio alive until the process ends.
+def _keep_grpc() -> int:
+    """Keeps gRPC's runtime for asyncio alive until the process ends, whose number it gives.
 
     Without it the last channel that goes waits, within the garbage collector and without a bound, for calls whose
     messages are still being written; to a server that has stopped reading they are written for ever
     (gRPC issues 22365 and 40989).
     """
     grpc.aio.init_grpc_aio()
+    return os.getpid()
 
 
 class Connection(Open, Address):
     """A channel whose calls are awaited."""
 
     def __init__(self, channel: Any, token: Optional[str], reconnect: float) -> None:
-        _keep_grpc()
         super().__init__(channel)
         self.metadata, self.reconnect = metadata(token), reconnect
 
@@ -281,6 +282,9 @@ class Server(Awaiting, ServerCalls[Simulation]):
     def __init__(self, address: str, token: Optional[str], credentials: Any, reconnect: float) -> None:
         options = channel_options(address)
         target = access.target(address)
+        if _keep_grpc() != os.getpid():
+            raise RuntimeError("gRPC's runtime for asyncio does not survive a fork, and calls would wait for ever: start processes by "
+                               "multiprocessing's \"spawn\", or use mbcosim.connect in them")
         channel = grpc.aio.secure_channel(target, credentials, options) if credentials else grpc.aio.insecure_channel(target, options)
         self.address = address
         self._connection = Connection(channel, token, reconnect)
