@@ -304,14 +304,15 @@ def test_the_motions_of_a_function_are_not_iterated_over(daemon):
 
 
 def test_a_forked_process_is_told_that_it_has_no_asyncio(daemon):
-    """Its calls would wait for ever."""
+    """Its calls would wait for ever, those of the blocking client, too."""
     async def ask():
         async with mbcosim.aio.connect(daemon.address) as server:
             return await server.info()
 
     def child():
-        with pytest.raises(RuntimeError, match="does not survive a fork"):
-            asyncio.run(ask())
+        for connect in (lambda: asyncio.run(ask()), lambda: mbcosim.connect(daemon.address)):
+            with pytest.raises(mbcosim.Unavailable, match="connections do not survive a fork"):
+                connect()
 
     assert asyncio.run(ask()).version
     process = multiprocessing.get_context("fork").Process(target=child)

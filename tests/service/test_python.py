@@ -104,6 +104,47 @@ def test_a_private_daemon_is_that_of_the_process_that_started_it():
     assert left == "False" and float(seconds) < 1.9 * TIME_FACTOR
 
 
+FORKED_WITH_A_CONNECTION = """
+import mbcosim, multiprocessing, sys
+context = multiprocessing.get_context("fork")
+
+def connect(address):
+    try:
+        with mbcosim.connect(address) as server:
+            return server.info().version
+    except mbcosim.Unavailable as error:
+        return str(error)
+
+with mbcosim.local() as server:
+    other = mbcosim.connect(server.address)
+    with other.load(sys.argv[1]) as simulation:
+        def leave():
+            with other, simulation:
+                simulation.step()
+
+        for _ in range(3):
+            simulation.step(5)
+            with context.Pool(2) as pool:
+                assert all("do not survive a fork" in text for text in pool.map(connect, [server.address] * 8))
+        left = context.Process(target=leave)
+        left.start()
+        left.join()
+        assert left.exitcode == 1  # Unavailable; what it left is the other's
+        assert simulation.step(5).step == 20
+    other.close()
+with mbcosim.local() as server:
+    mbcosim.Server.close(server)  # the daemon goes on
+    with context.Pool(2) as pool:
+        print(*pool.map(connect, [server.address] * 8))
+"""
+
+
+def test_a_forked_process_makes_no_calls_where_a_connection_was_open(pendulum):
+    """It got what was for the other one, which failed or hung."""
+    done = subprocess.run([sys.executable, "-c", FORKED_WITH_A_CONNECTION, pendulum], stdout=subprocess.PIPE, text=True, timeout=60 * TIME_FACTOR, check=True)
+    assert done.stdout.split() == 8 * [mbcosim.__version__]
+
+
 def test_a_private_daemon_that_is_stopped_delays_nobody_for_long():
     with mbcosim.local() as server:
         os.kill(daemon_of(server), signal.SIGSTOP)

@@ -16,7 +16,6 @@ import asyncio
 import contextlib
 import functools
 import inspect
-import os
 import time
 from collections.abc import AsyncIterator, Awaitable, Callable, Iterable, Mapping
 from typing import Any, Optional, TypeVar, Union
@@ -32,7 +31,7 @@ from .calls import Condition, ServerCalls, SimulationCalls, SnapshotCalls, StepR
 from .coupling import Answer, open_stream
 from .errors import Busy, Error, PreconditionFailed, StepFailed, TimedOut, Unavailable, cancelled_here, from_rpc_error, translated
 from .histories import History
-from .rpc import (PARTING, USUAL, Address, Awaiting, Bound, Call, Calls, Open, Retries, cancelling, channel_options, checked_timeout, metadata,
+from .rpc import (PARTING, USUAL, Address, Awaiting, Bound, Call, Calls, InUse, Open, Retries, cancelling, channel_options, checked_timeout, metadata,
                   parting, runs_calls)
 from .simulation import subscribe_request
 from .stepping import AwaitedSharedStream, AwaitedStepLine, status_of
@@ -66,15 +65,15 @@ async def connect(address: Optional[str] = None, *, token: Optional[str] = None,
 
 
 @functools.cache
-def _keep_grpc() -> int:
-    """Keeps gRPC's runtime for asyncio alive until the process ends, whose number it gives.
+def _keep_grpc() -> InUse:
+    """Keeps gRPC's runtime for asyncio alive until the process ends.
 
     Without it the last channel that goes waits, within the garbage collector and without a bound, for calls whose
     messages are still being written; to a server that has stopped reading they are written for ever
     (gRPC issues 22365 and 40989).
     """
     grpc.aio.init_grpc_aio()
-    return os.getpid()
+    return InUse()
 
 
 class Connection(Open, Address):
@@ -282,9 +281,8 @@ class Server(Awaiting, ServerCalls[Simulation]):
     def __init__(self, address: str, token: Optional[str], credentials: Any, reconnect: float) -> None:
         options = channel_options(address)
         target = access.target(address)
-        if _keep_grpc() != os.getpid():
-            raise RuntimeError("gRPC's runtime for asyncio does not survive a fork, and calls would wait for ever: start processes by "
-                               "multiprocessing's \"spawn\", or use mbcosim.connect in them")
+        InUse.check()
+        _keep_grpc()
         channel = grpc.aio.secure_channel(target, credentials, options) if credentials else grpc.aio.insecure_channel(target, options)
         self.address = address
         self._connection = Connection(channel, token, reconnect)
@@ -300,7 +298,9 @@ class Server(Awaiting, ServerCalls[Simulation]):
 
     async def close(self) -> None:
         """Closes the connection. Simulations on the server live on for their lease."""
-        await self._connection.close()
+        closing = self._connection.close()
+        if closing is not None:
+            await closing
 
 
 class Events(events.Course, _Watcher):

@@ -781,6 +781,7 @@ class SimulationCalls(Generic[SnapshotKind]):
         yield from self._delete(timeout)
 
     def _delete(self, timeout: Optional[float], patient: bool = False) -> Calls[None]:
+        self._connection.check()
         self._leave()
         request = pb.DeleteSimulationRequest(simulation=self.name, request_id=_new_id())
         yield Call("Simulations/DeleteSimulation", request, timeout, repeatable=True, patient=patient)

@@ -14,7 +14,7 @@ from . import access
 from .calls import ServerCalls
 from .errors import Unavailable, translated
 from .events import Events
-from .rpc import PARTING, USUAL, Blocking, Connection, blocking, channel_options, runs_calls
+from .rpc import PARTING, USUAL, Blocking, Connection, InUse, blocking, channel_options, runs_calls
 from .simulation import Simulation
 
 Self = TypeVar("Self", bound="Server")
@@ -71,6 +71,7 @@ class Server(Blocking, ServerCalls[Simulation]):
     _simulation_class = Simulation
 
     def __init__(self, address: str, token: Optional[str] = None, credentials: Any = None, reconnect: float = 0.0) -> None:
+        InUse.check()
         options = channel_options(address)
         target = access.target(address)
         channel = grpc.secure_channel(target, credentials, options) if credentials else grpc.insecure_channel(target, options)

@@ -6,12 +6,14 @@ import dataclasses
 import functools
 import inspect
 import math
+import os
 import queue
 import re
 import threading
 import time
+import weakref
 from collections.abc import Callable, Coroutine, Generator, Iterator
-from typing import TYPE_CHECKING, Any, Generic, Optional, TypeVar, Union, cast, overload
+from typing import TYPE_CHECKING, Any, ClassVar, Generic, Optional, TypeVar, Union, cast, overload
 
 import grpc
 
@@ -234,11 +236,33 @@ class Retries:
         return min(_PAUSE, left)
 
 
+class InUse:
+    """Says, while it is referred to, that this process uses gRPC, which does not survive a fork: each process would get what is for the other."""
+    _all: ClassVar[set[weakref.ref[InUse]]] = set()
+
+    def __init__(self) -> None:
+        self._process = os.getpid()
+        self._all.add(weakref.ref(self, self._all.discard))
+
+    def here(self) -> bool:
+        """Was this process not forked since?"""
+        return self._process == os.getpid()
+
+    @classmethod
+    def check(cls) -> None:
+        """Raises Unavailable where this process was forked from one that used gRPC then."""
+        uses = [found() for found in tuple(cls._all)]
+        if not all(use is None or use.here() for use in uses):
+            raise Unavailable("connections do not survive a fork: this process was forked from one that had one. Close them before, those of asyncio "
+                              "cannot be, or start processes by multiprocessing's \"spawn\"", grpc.StatusCode.UNAVAILABLE)
+
+
 class Open:
-    """A channel until it is closed; then Unavailable is raised in its place."""
+    """A channel until it is closed; then Unavailable is raised in its place, as in a process that is forked while it is open."""
 
     def __init__(self, channel: Any) -> None:
         self._channel, self._stubs, self._closed = channel, Stubs(channel), False
+        self._use: Optional[InUse] = InUse()
 
     @property
     def channel(self) -> Any:
@@ -251,13 +275,17 @@ class Open:
         return self._stubs
 
     def check(self) -> None:
-        """Raises Unavailable when this side has closed it."""
+        """Raises Unavailable when this side has closed it, or it is another process's."""
         if self._closed:
             raise Unavailable("the connection is closed", grpc.StatusCode.UNAVAILABLE)
+        if self._use is not None and not self._use.here():
+            InUse.check()
 
     def close(self) -> Any:
-        """What the channel's `close` gives: a coroutine of asyncio's."""
-        self._closed = True
+        """What the channel's `close` gives: a coroutine of asyncio's. None in a forked process: it is the other one's."""
+        if self._use is not None and not self._use.here():
+            return None
+        self._closed, self._use = True, None
         return self._channel.close()
 
 
