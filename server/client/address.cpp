@@ -33,6 +33,9 @@ std::string fault_of(const std::string& address) {
     const std::size_t longest = sizeof(sockaddr_un::sun_path) - 1;
     if (address.size() - kUnix.size() > longest)
       return "the path of a socket has at most " + std::to_string(longest) + " bytes";
+    if (address.find(',') != std::string::npos)
+      return "a comma in the path of a socket is for gRPC the beginning of another one: choose a "
+             "path without";
     return address.find_first_not_of('/', kUnix.size()) == std::string::npos
                ? "it names no socket: expected unix:PATH"
                : "";

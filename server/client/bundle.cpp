@@ -1,5 +1,9 @@
 #include "client/bundle.h"
 
+#include <grpcpp/support/status_code_enum.h>
+
+#include <cerrno>
+#include <cstring>
 #include <filesystem>
 #include <fstream>
 #include <iterator>
@@ -13,8 +17,13 @@ namespace {
 namespace fs = std::filesystem;
 
 std::string read_file(const fs::path& path) {
+  std::error_code error;
   std::ifstream file(path, std::ios::binary);
-  if (!file) throw Error("cannot open \"" + path.string() + "\"", 5, "", {});
+  if (!file || !fs::is_regular_file(path, error)) {
+    const std::string why = file ? "it is no regular file" : std::strerror(errno);
+    throw Error("cannot open \"" + path.string() + "\": " + why,
+                static_cast<int>(grpc::StatusCode::NOT_FOUND), "", {});
+  }
   return {std::istreambuf_iterator<char>(file), std::istreambuf_iterator<char>()};
 }
 
@@ -49,11 +58,15 @@ std::string name_in_bundle(const fs::path& folder, const fs::path& base, const s
 
 std::map<std::string, std::string> collect_bundle(const std::string& folder,
                                                   const std::string& main) {
-  const fs::path root = fs::canonical(folder.empty() ? "." : folder);
+  std::error_code error;
+  const fs::path root = fs::canonical(folder.empty() ? "." : folder, error);
+  if (error)
+    throw Error("cannot open \"" + (fs::path(folder) / main).string() + "\": " + error.message(),
+                static_cast<int>(grpc::StatusCode::NOT_FOUND), "", {});
   std::map<std::string, std::string> files;
   std::vector<std::string> waiting = {main};
   const std::string view = fs::path(main).replace_extension(".view.json").generic_string();
-  if (fs::is_regular_file(root / view)) waiting.push_back(view);
+  if (fs::is_regular_file(root / view, error)) waiting.push_back(view);
   while (!waiting.empty()) {
     const std::string name = waiting.back();
     waiting.pop_back();

@@ -9,6 +9,7 @@
 #include "client/convert.h"
 #include "client/simulation.h"
 #include "client/step_lines.h"
+#include "host/addresses.h"
 
 namespace mbcosim::client {
 namespace {
@@ -28,8 +29,10 @@ std::shared_ptr<grpc::ChannelCredentials> channel_credentials(const Credentials&
 }
 
 /// A server that is stopped or behind a black hole is noticed within 20 s.
-grpc::ChannelArguments channel_arguments() {
+grpc::ChannelArguments channel_arguments(const std::string& address) {
   grpc::ChannelArguments arguments;
+  // No proxy of the environment ($http_proxy) can stand between this machine and itself.
+  if (server::is_loopback(address)) arguments.SetInt(GRPC_ARG_ENABLE_HTTP_PROXY, 0);
   arguments.SetInt(GRPC_ARG_KEEPALIVE_TIME_MS, 10000);
   arguments.SetInt(GRPC_ARG_KEEPALIVE_TIMEOUT_MS, 10000);
   arguments.SetInt(GRPC_ARG_KEEPALIVE_PERMIT_WITHOUT_CALLS, 1);
@@ -136,7 +139,8 @@ Server Server::connect(const std::string& address, double timeout, const Credent
   impl->reconnect = reconnect;
   if (!credentials.token.empty()) impl->authorization = "Bearer " + credentials.token;
   impl->channel =
-      grpc::CreateCustomChannel(address, channel_credentials(credentials), channel_arguments());
+      grpc::CreateCustomChannel(server::channel_target(address), channel_credentials(credentials),
+                                channel_arguments(address));
   impl->simulations = v1::Simulations::NewStub(impl->channel);
   impl->coupling = v1::Coupling::NewStub(impl->channel);
   impl->step_lines = std::make_unique<StepLines>(*impl);

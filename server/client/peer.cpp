@@ -409,6 +409,9 @@ void Peer::Impl::give_up(const std::string& why) {
 
 void Peer::Impl::close() {
   if (!open) return;
+  if (thread.get_id() == std::this_thread::get_id())
+    throw Error("a peer cannot be closed by its own function, which has to return first",
+                static_cast<int>(grpc::StatusCode::FAILED_PRECONDITION), "", {});
   open = false;
   std::optional<Deadline> deadline;
   try {

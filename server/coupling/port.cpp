@@ -65,6 +65,7 @@ void Port::attach(PeerLink* link, const v1::Welcome& welcome) {
     const Guard guard(mutex_);
     if (recorder_) recorder_->attached(model_.name(), welcome);
     link_ = link;
+    had_peer_ = true;
     heard_.store(Clock::now().time_since_epoch().count());
     index_ = 0;
     awaited_ = false;
@@ -301,6 +302,7 @@ bool Port::pull() {
 }
 
 std::string Port::why_gone() const {
+  if (!had_peer_) return "no peer has attached to it";
   return refused_.empty() ? "the peer is gone"
                           : "the peer was sent away: " + refused_.substr(0, kLongestText);
 }

@@ -151,7 +151,8 @@ class Port {
   v1::PeerExchange received_ TS_GUARDED_BY(mutex_);  ///< what `answer_` was made of, for the record
   std::optional<Answer> answer_ TS_GUARDED_BY(mutex_);
   std::string peer_failure_ TS_GUARDED_BY(mutex_);  ///< the peer could not compute
-  std::string refused_ TS_GUARDED_BY(mutex_);       ///< why its last message was refused
+  bool had_peer_ TS_GUARDED_BY(mutex_) = false;
+  std::string refused_ TS_GUARDED_BY(mutex_);  ///< why its last message was refused
   std::optional<PeerRejected> rejection_ TS_GUARDED_BY(mutex_);
   std::optional<Refusal> ended_ TS_GUARDED_BY(mutex_);
   std::optional<Clock::time_point> waiting_since_ TS_GUARDED_BY(mutex_);

@@ -517,8 +517,9 @@ std::string refusal_of(const HealthCheck& check, const grpc::Status& status,
 int check_health(const HealthCheck& check) {
   grpc::ChannelArguments arguments;
   if (!check.name.empty()) arguments.SetSslTargetNameOverride(check.name);
+  if (is_loopback(check.address)) arguments.SetInt(GRPC_ARG_ENABLE_HTTP_PROXY, 0);
   const auto stub = grpc::health::v1::Health::NewStub(
-      grpc::CreateCustomChannel(check.address, credentials_of(check), arguments));
+      grpc::CreateCustomChannel(channel_target(check.address), credentials_of(check), arguments));
   grpc::health::v1::HealthCheckResponse response;
   const grpc::Status status = ask(check, *stub, false, &response);
   if (status.error_code() == grpc::StatusCode::UNAUTHENTICATED) return 0;

@@ -15,6 +15,17 @@ bool is_loopback(const std::string& address) {
   return host == "localhost" || host == "[::1]" || in_loopback_net;
 }
 
+std::string channel_target(const std::string& address) {
+  if (!address.starts_with("unix:")) return address;
+  std::string target;
+  for (const char c : address) {
+    const bool meant = c == '%' || c == '#' || c == '?';
+    target += meant ? "" : std::string(1, c);
+    if (meant) target += c == '%' ? "%25" : c == '#' ? "%23" : "%3F";
+  }
+  return target;
+}
+
 int port_of(const sockaddr_storage& name) {
   if (name.ss_family == AF_INET) return ntohs(reinterpret_cast<const sockaddr_in&>(name).sin_port);
   if (name.ss_family != AF_INET6) return -1;

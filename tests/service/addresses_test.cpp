@@ -16,6 +16,11 @@ TEST(Addresses, OfThisMachineOnly) {
     EXPECT_FALSE(is_loopback(each)) << each;
 }
 
+TEST(Addresses, AreWrittenForGrpc) {
+  EXPECT_EQ(channel_target("unix:/a b/c#1?%.sock"), "unix:/a b/c%231%3F%25.sock");
+  EXPECT_EQ(channel_target("localhost:80"), "localhost:80");
+}
+
 std::string network_of(const char* number) {
   in6_addr address{};
   EXPECT_EQ(::inet_pton(AF_INET6, number, &address), 1);

@@ -67,6 +67,7 @@ TEST(ClientAddress, ThatIsNoneIsRefusedAndNobodysIsToldWhy) {
            {"localhost:x", "a number from 1 to 65535"},
            {":1", "expected unix:PATH or HOST:PORT"},
            {"unix:", "names no socket"},
+           {"unix:/tmp/a,b", "a comma in the path of a socket"},
            {long_path, "at most 107 bytes"}}) {
     try {
       (void)Server::connect(address, 30);
@@ -1023,6 +1024,43 @@ TEST(Client, UploadsIncludedFiles) {
   std::ofstream(folder + "rest.mbd") << body();
   Server server = connect();
   EXPECT_TRUE(server.load(folder + "main.mbd").step().ok());
+}
+
+TEST(Client, DecksThatCannotBeOpenedAreErrors) {
+  const std::string folder = testing::TempDir();
+  Server server = connect();
+  for (const auto& [path, told] : {std::pair(folder + "none/x.mbd", "No such file or directory"),
+                                   {folder + "none.mbd", "No such file or directory"},
+                                   {folder + ".", "it is no regular file"}}) {
+    try {
+      server.load(path);
+      ADD_FAILURE() << path;
+    } catch (const Error& error) {
+      EXPECT_NE(std::string(error.what()).find("cannot open \""), std::string::npos)
+          << error.what();
+      EXPECT_NE(std::string(error.what()).find(told), std::string::npos) << error.what();
+    }
+  }
+}
+
+/// It would wait for itself.
+TEST_P(Coupled, APeerIsNotClosedByItsOwnFunction) {
+  Server server = connect();
+  Simulation simulation = server.load_text(body("1.e-2"), with_port());
+  std::atomic<Peer*> own = nullptr;
+  Peer peer = simulation.couple(
+      "spring",
+      [&](const Motion& motion) {
+        own.load()->close();
+        return spring(motion);
+      },
+      options());
+  own = &peer;
+  const StepResult result = simulation.step();
+  EXPECT_FALSE(result.ok());
+  EXPECT_NE(result.failure.find("a peer cannot be closed by its own function"), std::string::npos)
+      << result.failure;
+  peer.close();
 }
 
 /// Stops the daemon while it lives.
