@@ -1,6 +1,7 @@
 #include <charconv>
 #include <cmath>
 
+#include "input/grammar/grammar.h"
 #include "input/lexer.h"
 #include "input/nearest.h"
 #include "input/syntax.h"
@@ -105,7 +106,7 @@ class Parser {
           fail(at_, found.size(),
                "operator expected between " + in_quotes(before) + " and " + in_quotes(found));
         if (depth_ == 0 && last_ == Last::word && is_word_start(c) && !is_string_)
-          fail(at_, found.size(), "\",\" expected after " + in_quotes(before), "", "separator");
+          fail_words(before, found);
       }
       if (depth_ > 0)
         fail(at_, found.size(), "operator or \")\" expected before " + in_quotes(excerpt(found)));
@@ -123,6 +124,15 @@ class Parser {
       fail(at_, 1, "unexpected \"=\"",
            "comparison is ==; an assignment inside an expression needs parentheses");
     fail_unexpected(found);
+  }
+
+  /// Two words: one that the argument before needed is left out, or a comma between two values.
+  [[noreturn]] void fail_words(std::string_view before, std::string_view found) {
+    const std::size_t end = skip_words(text_, last_begin_);
+    const std::string_view all = text_.substr(last_begin_, end - last_begin_);
+    if (is_word_of_language(all))
+      fail(last_begin_, all.size(), "a value expected, found the word " + in_quotes(all));
+    fail(at_, found.size(), "\",\" expected after " + in_quotes(before), "", "separator");
   }
 
   [[noreturn]] void fail_missing_semicolon(std::size_t where) const {

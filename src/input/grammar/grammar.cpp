@@ -1,5 +1,6 @@
 #include "input/grammar/grammar.h"
 
+#include <algorithm>
 #include <set>
 #include <sstream>
 
@@ -84,6 +85,12 @@ const WordGrammar* find_grammar(std::string_view group, std::string_view word) {
   if (g == grammars().end()) return nullptr;
   const auto w = g->second.words.find(normalized(word));
   return w == g->second.words.end() ? nullptr : &w->second;
+}
+
+bool is_word_of_language(std::string_view word) {
+  const std::string name = normalized(word);
+  return std::any_of(grammars().begin(), grammars().end(),
+                     [&](const auto& group) { return group.second.words.contains(name); });
 }
 
 std::string written_form(std::string_view group, std::string_view word) {

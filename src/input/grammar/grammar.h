@@ -46,6 +46,9 @@ const std::map<std::string, GroupGrammar>& grammars();
 /// Null when there is none.
 const WordGrammar* find_grammar(std::string_view group, std::string_view word);
 
+/// Is it a word of any group?
+bool is_word_of_language(std::string_view word);
+
 /// How a word of a group is written, with what stands around it; empty when there is no grammar of
 /// it. What is longer than a few lines of a terminal ends with "…".
 std::string written_form(std::string_view group, std::string_view word);

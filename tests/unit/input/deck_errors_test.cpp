@@ -249,6 +249,18 @@ TEST(MalformedDeck, HasOneErrorForARefusedElement) {
             "error: end of the deck: 1 joint missing");
 }
 
+/// The length of a rod is left out, or a comma.
+TEST(MalformedDeck, TellsWordsOfTheLanguageFromValuesWithoutAComma) {
+  const auto of = [](const std::string& length) {
+    const DeckText deck =
+        elements("set: real a = 1.; set: real b = 2.; joint: 1, rod, 1, 2, " + length + ", 100.;",
+                 std::string(kDynamic) + "structural: 2, static, 1., 0., 0., eye, null, null;");
+    return load(deck).diagnostics.at(0).message;
+  };
+  EXPECT_EQ(of("linear elastic"), "a value expected, found the word \"linear elastic\"");
+  EXPECT_EQ(of("a b"), "\",\" expected after \"a\"");
+}
+
 /// A card that is refused after what it says of its output has made no drive.
 TEST(MalformedDeck, HasNoDriveOfARefusedCardToWrite) {
   DeckText deck = elements("drive caller: 1, time, 5.; drive caller: 2, time;");
