@@ -37,10 +37,10 @@ def head(words, scope):
 def grammar(groups):
     served = {g["name"]: [w["word"] for w in g["words"] if w["served"]] for g in groups}
     refused = {g["name"]: [w["word"] for w in g["words"] if not w["served"]] for g in groups}
-    blocks = ("statement", "initial value card", "inverse dynamics card", "control card", "node", "element")
+    blocks = ("data card", "statement", "initial value card", "inverse dynamics card", "control card", "node", "element")
     families = ("joint", "jointregularization", "force", "couple", "genel", "electric", "thermal", "bulk", "hydraulic",
                 "userdefined", "file driver")
-    cards = sum((served[name] for name in blocks), ["file", "problem"])
+    cards = sum((served[name] for name in blocks), ["file"])
     types = sum((served[name] for name in families), [])
     objects = sum((served[name] for name in ("drive", "law", "function", "fluid")), [])
     known = set(types) | set(objects) | set(cards)

@@ -122,6 +122,7 @@ void add_blocks(Collector& c) {
   c.plain("block", "Blocks",
           {"data", "initial value", "inverse dynamics", "control data", "nodes", "drivers",
            "elements"});
+  c.plain("data card", "Cards of `data`", {"problem"});
   c.plain("statement", "Statements that may stand anywhere",
           {"begin",
            "end",

@@ -283,15 +283,20 @@ class Decks:
                 f"begin: drivers; {cards.get('drivers', '')} end: drivers;\n"
                 f"begin: elements;\n{cards.get('all_elements', ELEMENTS)}\n{cards.get('elements', '')}\nend: elements;\n")
 
+    def inverse_deck(self, cards):
+        return self.deck(inverse=f"problem type: underdetermined fully actuated; {cards}", all_nodes="structural: 1, static, null, eye, null, null;",
+                         all_elements="joint: 1, clamp, 1, node, node;")
+
     def sentence(self, group, word, text, size=None):
         """The deck of one sentence."""
         body = f"{word}, {text}" if text else word
         label = str(self.label)
+        if group == "data card":
+            return self.inverse_deck("") if text == "inverse dynamics" else self.deck()
         if group == "initial value card":
             return self.deck(initial=f"{word}: {text};" if text else f"{word};")
         if group == "inverse dynamics card":
-            return self.deck(inverse=f"problem type: underdetermined fully actuated; {word}{': ' + text if text else ''};",
-                             all_nodes="structural: 1, static, null, eye, null, null;", all_elements="joint: 1, clamp, 1, node, node;")
+            return self.inverse_deck(f"{word}{': ' + text if text else ''};")
         if group == "control card" and word == "rigid body kinematics":
             return self.deck(control=f"{word}: {text};", all_nodes="structural: 1, dynamic, null, eye, null, null;", all_elements="")
         if group == "control card" and word in ("gravity", "air properties"):

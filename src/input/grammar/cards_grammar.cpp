@@ -13,6 +13,10 @@ nodes
 drivers
 elements
 
+@ data card | <word> : <grammar> ;
+problem
+  = { initial value | inverse dynamics }
+
 @ statement | <word> [ : <grammar> ] ;
 begin
   = <block>
