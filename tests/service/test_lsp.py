@@ -171,6 +171,9 @@ def test_completion_offers_what_fits_the_place(editor, pendulum_text):
     assert edit["newText"] == "spherical hinge" and edit["range"]["end"]["character"] - edit["range"]["start"]["character"] == 3
     labels = {item["label"] for item in editor.at("completion", uri, pendulum_text, "begin: data", 6)["items"]}
     assert {"control data", "elements"} <= labels and "joint" not in labels
+    begun = pendulum_text.replace("problem: initial value;", "prob")
+    editor.change(uri, begun)
+    assert "problem" in {item["label"] for item in editor.at("completion", uri, begun, "prob", 4)["items"]}
 
 
 def test_hover_tells_values_and_words(editor):
