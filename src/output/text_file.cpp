@@ -6,7 +6,6 @@
 #include <unistd.h>
 
 #include <algorithm>
-#include <cerrno>
 
 namespace mbcosim {
 
@@ -43,13 +42,10 @@ void TextFile::make_room(std::size_t count) {
   text_ = std::move(larger);
 }
 
-void TextFile::fail() {
+void TextFile::fail(const std::string& why) {
   if (!problem_) return;
-  problem_ = make_error(ErrorKind::io, "OUTPUT_NOT_WRITTEN",
-                        "cannot write \"" + path_ + "\": " +
-                            (errno == EWOULDBLOCK ? "another run is writing it; give each a prefix "
-                                                    "of its own"
-                                                  : std::strerror(errno)));
+  problem_ =
+      make_error(ErrorKind::io, "OUTPUT_NOT_WRITTEN", "cannot write \"" + path_ + "\": " + why);
 }
 
 void TextFile::fail_budget() { problem_ = over_budget(*budget_); }
@@ -59,6 +55,8 @@ void TextFile::create() {
   file_ = opened_alone(path_);
   if (file_)
     std::setvbuf(file_, nullptr, _IONBF, 0);  // the pieces are large already
+  else if (errno == EWOULDBLOCK)
+    fail("another run is writing it; give each a prefix of its own");
   else
     fail();
 }

@@ -1,6 +1,7 @@
 /// Text files of results.
 #pragma once
 
+#include <cerrno>
 #include <cstdint>
 #include <cstdio>
 #include <cstring>
@@ -71,7 +72,7 @@ class TextFile {
 
  private:
   void make_room(std::size_t count);
-  void fail();
+  void fail(const std::string& why = std::strerror(errno));
   void fail_budget();
   void write();
   void end_at_last_line(std::size_t written);
