@@ -116,7 +116,7 @@ namespace {
 
 /// What kept gRPC from a connection: nobody listens, a certificate that is not trusted.
 std::string last_cause(const Server::Impl& server) {
-  constexpr double kAtOnce = 1;  // [s]; that it failed is known
+  constexpr double kAtOnce = 0.1;  // [s]; that it failed is known
   CallContext context(server, kAtOnce);
   v1::GetServerInfoReply reply;
   return server.simulations->GetServerInfo(&context, {}, &reply).error_message();

@@ -51,6 +51,14 @@ class Daemon:
     def connect(self, **options):
         return mbcosim.connect(self.address, timeout=30, **options)
 
+    def tcp_address(self):
+        """HOST:PORT of the first address of that kind on which it listens."""
+        def found():
+            return re.search(r'listening on ((?!unix:)\S+:\d+)', self.log())
+
+        wait_for(lambda: found() or not self.alive())
+        return found().group(1)
+
     def alive(self):
         return self.process.poll() is None
 
@@ -93,6 +101,15 @@ def start_daemon(tmp_path_factory):
     yield start
     for daemon in daemons:
         daemon.stop()
+
+
+@pytest.fixture
+def behind_a_proxy(start_daemon, monkeypatch):
+    """A daemon at a TCP address of this machine, which the environment says a proxy leads to that is not there."""
+    monkeypatch.setenv("http_proxy", "http://127.0.0.1:9")
+    for name in ("no_proxy", "no_grpc_proxy"):
+        monkeypatch.delenv(name, raising=False)
+    return start_daemon("--listen", "127.0.0.1:0", "--insecure")
 
 
 @pytest.fixture(scope="module")

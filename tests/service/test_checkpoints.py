@@ -349,16 +349,23 @@ def test_commands_say_what_is_wrong(start, tmp_path):
         assert code == 4 and f"no server answers at {address}: " in errors and why in errors, errors
 
 
-def test_names_of_sockets_and_proxies_do_not_stand_in_the_way(start_daemon, tmp_path):
+def test_names_of_sockets_do_not_stand_in_the_way(start_daemon, tmp_path):
     folder = tmp_path / "run #1? 50%"
     folder.mkdir()
-    daemon = start_daemon("--listen", f"unix:{folder}/socket", "--listen", "localhost:0", "--insecure")
-    wait_for(lambda: "listening on localhost:" in daemon.log())
-    port = daemon.log().split("listening on localhost:")[1].split()[0]
-    proxy = {"http_proxy": "http://127.0.0.1:1", "no_proxy": "", "no_grpc_proxy": ""}
-    for address in (f"unix:{folder}/socket", f"localhost:{port}", f"127.0.0.1:{port}"):
-        assert run("sessions", "--address", address, "--timeout", "5", **proxy)[0] == 0
-        assert subprocess.run([os.path.join(BIN, "mbcosimd"), "--check", address], env={**os.environ, **proxy}, timeout=60).returncode == 0
+    start_daemon("--listen", f"unix:{folder}/socket")
+    assert_reached(f"unix:{folder}/socket")
+
+
+def test_no_proxy_of_the_environment_is_asked_for_this_machine(behind_a_proxy):
+    address = behind_a_proxy.tcp_address()
+    for same in (address, address.replace("127.0.0.1", "localhost")):
+        assert_reached(same)
+
+
+def assert_reached(address):
+    """By commands and by the health check."""
+    assert run("sessions", "--address", address, "--timeout", "5")[0] == 0
+    assert subprocess.run([os.path.join(BIN, "mbcosimd"), "--check", address], timeout=60).returncode == 0
 
 
 @pytest.mark.parametrize("make", [os.mkfifo, os.mkdir, lambda path: os.symlink("/dev/zero", path)], ids=["pipe", "folder", "device"])

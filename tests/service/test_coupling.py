@@ -190,6 +190,12 @@ def test_signals(server):
 
 # ---------------------------------------------------------------- failures
 
+def test_a_port_without_a_peer_says_so(server):
+    with server.load_text(decks.body(), ports=[mbcosim.structural_port("tip", nodes=[1])]) as simulation:
+        with pytest.raises(mbcosim.StepFailed, match='port "tip": no peer has attached to it'):
+            simulation.step()
+
+
 def test_a_peer_that_raises_fails_the_step_and_the_session_goes_on(server):
     calls = []
 

@@ -230,25 +230,18 @@ def test_tokens_may_stand_hashed_in_their_file(start_daemon, tmp_path):
 
 def test_loopback_tcp_on_request(start_daemon):
     daemon = start_daemon("--listen", "127.0.0.1:0", "--insecure")
-    wait_for(lambda: "127.0.0.1:" in daemon.log())
-    port = daemon.log().split("listening on 127.0.0.1:")[1].split()[0]
-    with mbcosim.connect(f"127.0.0.1:{port}") as server, server.load_text(decks.body()) as simulation:
+    with mbcosim.connect(daemon.tcp_address()) as server, server.load_text(decks.body()) as simulation:
         assert simulation.step().step == 1
 
 
-def test_no_proxy_of_the_environment_is_asked_for_this_machine(start_daemon, monkeypatch):
-    daemon = start_daemon("--listen", "127.0.0.1:0", "--insecure")
-    wait_for(lambda: "127.0.0.1:" in daemon.log())
-    port = daemon.log().split("listening on 127.0.0.1:")[1].split()[0]
-    monkeypatch.setenv("http_proxy", "http://127.0.0.1:9")
-    for name in ("no_proxy", "no_grpc_proxy"):
-        monkeypatch.delenv(name, raising=False)
+def test_no_proxy_of_the_environment_is_asked_for_this_machine(behind_a_proxy):
+    address = behind_a_proxy.tcp_address()
 
     async def awaited():
-        async with mbcosim.aio.connect(f"localhost:{port}") as server:
+        async with mbcosim.aio.connect(address.replace("127.0.0.1", "localhost")) as server:
             return await server.info()
 
-    with mbcosim.connect(f"127.0.0.1:{port}") as server:
+    with mbcosim.connect(address) as server:
         assert server.info().version == asyncio.run(awaited()).version
 
 
@@ -362,8 +355,7 @@ def test_certificates_give_identities_of_one_form(start_daemon, tmp_path):
         """Function that connects with credentials to a daemon of its own."""
         daemon = start_daemon("--listen", "localhost:0", "--tls-certificate", str(tmp_path / "server.pem"), "--tls-key",
                               str(tmp_path / "server.key"), "--tls-client-ca", str(tmp_path / "ca.pem"), *options)
-        wait_for(lambda: "listening on localhost:" in daemon.log())
-        address = "localhost:" + daemon.log().split("listening on localhost:")[1].split()[0]
+        address = daemon.tcp_address()
         return lambda *secrets: mbcosim.connect(address, credentials=grpc.ssl_channel_credentials(ca, *secrets), timeout=10)
 
     def told(connect):

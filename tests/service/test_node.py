@@ -66,18 +66,12 @@ def test_the_example_follows_the_pendulum(node_client, daemon):
     assert len(lines) == 5 and lines[-1].startswith("2.500 s: ")
 
 
-def test_no_proxy_of_the_environment_is_asked_for_this_machine(node_client, start_daemon, monkeypatch):
-    daemon = start_daemon("--listen", "127.0.0.1:0", "--insecure")
-    wait_for(lambda: "127.0.0.1:" in daemon.log())
-    port = daemon.log().split("listening on 127.0.0.1:")[1].split()[0]
-    monkeypatch.setenv("http_proxy", "http://127.0.0.1:9")
-    for name in ("no_proxy", "no_grpc_proxy"):
-        monkeypatch.delenv(name, raising=False)
+def test_no_proxy_of_the_environment_is_asked_for_this_machine(node_client, behind_a_proxy):
     ask = f"""import {{ call, connect }} from "./mbcosim.mjs";
-              const server = connect("127.0.0.1:{port}");
+              const server = connect("{behind_a_proxy.tcp_address()}");
               console.log((await call(server, server.simulations, "GetServerInfo", {{}}, 10)).version);
               server.close();"""
-    assert run(["node", "--input-type=module", "--eval", ask], node_client, daemon).strip()
+    assert run(["node", "--input-type=module", "--eval", ask], node_client, behind_a_proxy).strip()
 
 
 def test_the_lock_file_names_no_host():

@@ -101,8 +101,7 @@ def daemon_with_tls(start_daemon, tmp_path, *options):
     certificate(tmp_path, "server", "/CN=localhost", "ca", ["-addext", "subjectAltName=DNS:localhost"])
     daemon = start_daemon("--listen", "localhost:0", "--tls-certificate", str(tmp_path / "server.pem"), "--tls-key",
                           str(tmp_path / "server.key"), *options)
-    wait_for(lambda: "listening on localhost:" in daemon.log())
-    return daemon, "localhost:" + daemon.log().split("listening on localhost:")[1].split()[0]
+    return daemon, daemon.tcp_address()
 
 
 @pytest.fixture

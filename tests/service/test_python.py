@@ -373,8 +373,7 @@ def test_tls_takes_the_names_of_files_from_arguments_or_the_environment(start_da
     certificate(tmp_path, "arm", "/CN=arm", "ca")
     daemon = start_daemon("--listen", "localhost:0", "--tls-certificate", str(tmp_path / "server.pem"), "--tls-key", str(tmp_path / "server.key"),
                           "--tls-client-ca", str(tmp_path / "ca.pem"))
-    wait_for(lambda: "listening on localhost:" in daemon.log())
-    address = "localhost:" + daemon.log().split("listening on localhost:")[1].split()[0]
+    address = daemon.tcp_address()
     files = {"ca": tmp_path / "ca.pem", "certificate": tmp_path / "arm.pem", "key": tmp_path / "arm.key"}
     with mbcosim.connect(address, **files) as server:
         assert server.info().identity == "cert:CN=arm"

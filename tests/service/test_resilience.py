@@ -275,8 +275,7 @@ def test_health_asks_for_credentials_on_request_only(guarded, asks):
 def test_who_watches_health_from_one_machine_leaves_places_to_others(guarded):
     """Nobody asks who they are."""
     daemon = guarded("--listen", "127.0.0.1:0")
-    wait_for(lambda: "listening on 127.0.0.1:" in daemon.log())
-    address = re.search(r"listening on (127\.0\.0\.1:\d+)", daemon.log()).group(1)
+    address = daemon.tcp_address()
 
     def watch(channel):
         call = channel.unary_stream("/grpc.health.v1.Health/Watch", request_serializer=bytes, response_deserializer=bytes)
@@ -317,8 +316,7 @@ def test_one_identity_gets_half_of_the_simulations(guarded):
 
 def test_calls_over_one_connection_are_limited(start_daemon):
     daemon = start_daemon("--listen", "127.0.0.1:0", "--insecure", "--limit-connection-calls", "5")
-    wait_for(lambda: "127.0.0.1:" in daemon.log())
-    address = "127.0.0.1:" + daemon.log().split("listening on 127.0.0.1:")[1].split()[0]
+    address = daemon.tcp_address()
     own = [("grpc.use_local_subchannel_pool", 1)]
     with grpc.insecure_channel(address, options=own) as first, grpc.insecure_channel(address, options=own) as second:
         stop = threading.Event()
