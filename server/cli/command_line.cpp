@@ -266,7 +266,10 @@ int mbcosim::cli::command_line(int argc, char** argv) {
   RunOptions run_options;
   CLI::App* run_app =
       app.add_subcommand("run", "Run a deck to its final time and write the results");
-  run_app->add_option("deck", run_options.deck, "Main file of the deck")->required();
+  run_app
+      ->add_option("deck", run_options.deck,
+                   "Main file of the deck; also a pipe, as /dev/stdin, with `-o`")
+      ->required();
   run_app->add_option("-o,--output", run_options.prefix,
                       "Prefix of the result files (PREFIX.mov, PREFIX.jnt, ...), or a folder for "
                       "files of the deck's name; default: the deck's name without ending");

@@ -178,6 +178,16 @@ Status check_inputs(const std::vector<std::string>& read, const std::vector<std:
 constexpr std::uintmax_t kLongDeck = 32 << 10;  ///< [bytes]
 constexpr int kManyUnknowns = 500;
 
+/// A pipe's name is no name for results.
+bool needs_prefix(const RunOptions& options) {
+  namespace fs = std::filesystem;
+  std::error_code none;
+  const fs::file_status deck = fs::status(options.deck, none);
+  if (!fs::is_fifo(deck) && !fs::is_character_file(deck)) return false;
+  return options.prefix.empty() || options.prefix.back() == '/' ||
+         fs::is_directory(options.prefix, none);
+}
+
 std::uintmax_t size_of(const std::string& file) {
   std::error_code error;
   const std::uintmax_t size = std::filesystem::file_size(file, error);
@@ -188,6 +198,10 @@ std::uintmax_t size_of(const std::string& file) {
 
 int run(const RunOptions& options) {
   begin_heap();
+  if (needs_prefix(options))
+    return complain(make_error(ErrorKind::argument, "",
+                               "a deck from a pipe has no name for its results\n"
+                               "  hint: give them one with `-o PREFIX`"));
   InterruptGuard interrupt;
   const bool is_long = size_of(options.deck) > kLongDeck;
   if (is_long) keep_heap();

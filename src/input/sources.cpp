@@ -46,6 +46,21 @@ bool is_below(const fs::path& path, const fs::path& folder) {
   return true;
 }
 
+constexpr std::size_t kLargestStream = 256 << 20;  ///< [bytes]
+
+/// All that a pipe, or a terminal, says until it ends.
+Result<std::string> read_stream(std::FILE* in, const std::string& name) {
+  std::string text;
+  char piece[1 << 16];
+  while (const std::size_t size = std::fread(piece, 1, sizeof piece, in)) {
+    if (text.size() + size > kLargestStream)
+      return io_error(quote(name) + " does not end: 256 MiB were read");
+    text.append(piece, size);
+  }
+  if (std::ferror(in)) return io_error("cannot read " + quote(name) + ": " + std::strerror(errno));
+  return text;
+}
+
 /// The same for all names of a file: its device and its number there.
 using FileIdentity = std::pair<dev_t, ino_t>;
 
@@ -80,10 +95,13 @@ Result<std::string> FolderSource::read(const std::string& name) const {
   }
   const fs::file_status found = fs::status(path, ec);
   if (ec) return closed(ec.message());
-  if (!fs::is_regular_file(found)) return io_error(quote(name) + " is not a regular file");
+  const bool is_stream = unrestricted_ && (fs::is_fifo(found) || fs::is_character_file(found));
+  if (!fs::is_regular_file(found) && !is_stream)
+    return io_error(quote(name) + " is not a regular file");
   const std::unique_ptr<std::FILE, int (*)(std::FILE*)> in(std::fopen(path.c_str(), "rb"),
                                                            &std::fclose);
   if (!in) return closed(std::strerror(errno));
+  if (is_stream) return read_stream(in.get(), name);
   std::string text;
   const auto size = fs::file_size(path, ec);
   if (!ec) text.resize(size);

@@ -20,7 +20,8 @@ class FileSource {
 };
 
 /// Files below one folder. Refuses absolute names, `..` that leaves the folder and links that lead
-/// out, unless `unrestricted` (the command line on the user's own files).
+/// out, unless `unrestricted` (the command line on the user's own files, where pipes are read, too:
+/// `mbcosim run /dev/stdin -o out`).
 class FolderSource : public FileSource {
  public:
   explicit FolderSource(std::string folder, bool unrestricted = false);

@@ -53,6 +53,20 @@ def test_a_folder_takes_files_of_the_decks_name(deck, tmp_path, folder):
     assert {"deck.mov", "deck.out", "deck.log"} <= {path.name for path in (tmp_path / "results").iterdir()}
 
 
+def test_a_deck_comes_from_a_pipe(deck, tmp_path):
+    def run(*arguments):
+        return subprocess.run([MBCOSIM, "run", "/dev/stdin", *arguments], cwd=tmp_path, input=deck.read_text(), capture_output=True,
+                              text=True, timeout=60)
+    assert mbcosim("run", str(deck)).returncode == 0
+    piped = run("-o", "out")
+    assert (piped.returncode, piped.stderr) == (0, "")
+    assert (tmp_path / "out.mov").read_bytes() == (tmp_path / "deck.mov").read_bytes()
+    for nameless in ([], ["-o", "./"]):
+        refused = run(*nameless)
+        assert refused.returncode == 4 and "a deck from a pipe has no name for its results" in refused.stderr
+        assert "give them one with `-o PREFIX`" in refused.stderr
+
+
 @contextlib.contextmanager
 def endless_run(deck):
     """A run that has written results; it is interrupted at the end."""

@@ -1,10 +1,12 @@
 #include "input/sources.h"
 
 #include <gtest/gtest.h>
+#include <sys/stat.h>
 
 #include <cstdlib>
 #include <filesystem>
 #include <fstream>
+#include <thread>
 
 namespace mbcosim::sources_test {
 namespace {
@@ -63,6 +65,20 @@ TEST_F(FolderSourceTest, UnrestrictedReadsTheUsersOwnFiles) {
 
 TEST_F(FolderSourceTest, UnrestrictedTellsTheReason) {
   EXPECT_EQ(read("missing", true), "error: cannot open \"missing\": No such file or directory");
+}
+
+TEST_F(FolderSourceTest, UnrestrictedReadsPipesToTheirEnd) {
+  const std::string pipe = (root_ / "inside/pipe").string();
+  ASSERT_EQ(::mkfifo(pipe.c_str(), 0600), 0);
+  EXPECT_EQ(read("pipe"), "error: \"pipe\" is not a regular file");
+  const std::string long_text(200'000, 'x');
+  std::thread writer([&] { std::ofstream(pipe) << long_text << "end"; });
+  EXPECT_EQ(read("pipe", true), long_text + "end");
+  writer.join();
+}
+
+TEST_F(FolderSourceTest, UnrestrictedRefusesAStreamWithoutEnd) {
+  EXPECT_EQ(read("/dev/zero", true), "error: \"/dev/zero\" does not end: 256 MiB were read");
 }
 
 TEST_F(FolderSourceTest, OneFileIsKnownByAllItsNames) {
