@@ -3,6 +3,7 @@
 #include <Eigen/Sparse>
 #include <map>
 #include <memory>
+#include <optional>
 
 #include "model/model_part.h"
 #include "model/user_elements.h"
@@ -181,8 +182,8 @@ class Assembly {
     return std::sqrt(r2 / x2);
   }
 
-  /// −∂r/∂δ, with ε on the diagonal of the elements' own rows.
-  Eigen::SparseMatrix<double> matrix(double regularization) const {
+  /// −∂r/∂δ.
+  Eigen::SparseMatrix<double> matrix() const {
     std::vector<ElementSet::Triplet> entries;
     add_springs(entries);
     const EvalContext c = context();
@@ -192,24 +193,18 @@ class Assembly {
       const int row = row_of_[t.row], column = to_local_[t.column];
       if (row >= 0 && column >= 0) triplets.emplace_back(row, column, t.value);
     }
-    if (regularization > 0)
-      for (int a = node_rows_; a < size_; ++a)
-        for (const int row : {a, size_ + a}) triplets.emplace_back(row, row, regularization);
     Eigen::SparseMatrix<double> m(2 * size_, 2 * size_);
     m.setFromTriplets(triplets.begin(), triplets.end());
     return m;
   }
 
-  bool correct(double regularization = 0) {
-    factors_.factor(matrix(regularization), Watch(cancel_));
+  bool correct() {
+    factors_.factor(matrix(), Watch(cancel_));
     if (!factors_.regular()) return false;
     VecX rhs(2 * size_);
     for (int a = 0; a < size_; ++a) {
       rhs(a) = r_[rows_[a]];
       rhs(size_ + a) = r_rate_[rows_[a]];
-      if (a < node_rows_) continue;
-      rhs(a) -= regularization * state_.y[columns_[a]];
-      rhs(size_ + a) -= regularization * state_.yp[columns_[a]];
     }
     const VecX delta = factors_.solve(rhs) * model_.control.assembly_epsilon;
     if (!delta.allFinite()) return false;
@@ -278,11 +273,10 @@ class Assembly {
 
   /// Why the assembly failed: constraints that contradict each other, or that follow from each
   /// other; empty when neither is found. Tries more iterations, and then looks for the
-  /// configuration that violates the constraints least, with compliant constraints.
+  /// configuration that violates the constraints least.
   std::string diagnosis() {
     const int iterations = size_ > 20000 ? 10 : 60;
     state_ = start_;
-    double change = HUGE_VAL;
     compute_residual();
     if (error(false) <= model_.control.assembly_tolerance) return contradicted_velocities();
     for (int k = 1; k <= iterations && !is_cancelled() && correct(); ++k) {
@@ -294,47 +288,111 @@ class Assembly {
     }
     state_ = start_;
     compute_residual();
-    for (int k = 0; k < iterations && change > 1e-9; ++k) {
-      const std::vector<double> before = state_.y;
-      if (is_cancelled() || !correct(kCompliance)) return {};
-      compute_residual();
-      change = 0;
-      for (int a = 0; a < node_rows_; ++a)
-        change = std::max(change, std::abs(state_.y[columns_[a]] - before[columns_[a]]));
+    const double at_start = largest_violation();
+    const bool complied = comply(iterations);
+    if (is_cancelled()) return {};
+    if (complied) {
+      if (std::string fight = contradictions(at_start); !fight.empty()) return fight;
+    } else {
+      state_ = start_;
     }
-    const std::string fight = contradictions();
-    if (!fight.empty()) return fight;
-    const NullSpace null = find_null_space(matrix(0), 1e-12, Watch(cancel_));
-    if (null.rank_loss == 0) return {};
+    const NullSpace null = find_null_space(matrix(), 1e-12, Watch(cancel_));
+    if (null.rank_loss == 0) return complied ? met_elsewhere() : "";
     return "these constraints follow from each other: " +
            joined(owners_of(model_, by_model_row(null.left), 6)) +
            "\n  hint: remove the redundant ones, or regularize a joint " + kRegularization;
   }
 
-  /// The constraints that stay violated, largest violation of each element first. Those that agree
-  /// are violated by the compliance times a multiplier, which is of the order of what moves nodes
-  /// back to where they were given.
-  std::string contradictions() const {
+  /// Goes from the start to where the constraints are violated least, by Levenberg and Marquardt's
+  /// method. False when it cannot begin.
+  bool comply(int iterations) {
+    double violated = violation();
+    for (int k = 0; k < iterations && violated > 0; ++k) {
+      const auto delta = is_cancelled() ? std::nullopt : least_squares_correction();
+      if (!delta) return k > 0;
+      const State before = state_;
+      double now = HUGE_VAL;
+      for (double step = 1; step > 1e-3 && !(now < violated); step /= 2) {
+        state_ = before;
+        apply(step * *delta);
+        compute_residual();
+        now = violation();
+      }
+      if (!(now < violated)) {
+        state_ = before;
+        compute_residual();
+        return true;
+      }
+      const bool is_done = violated - now <= 1e-9 * violated;
+      violated = now;
+      if (is_done) return true;
+    }
+    return true;
+  }
+
+  double largest_violation() const {
     double largest = 0;
     for (int a = node_rows_; a < size_; ++a) largest = std::max(largest, std::abs(r_[rows_[a]]));
-    if (!(largest > 100 * kCompliance * std::max(1.0, restoring_load()))) return {};
+    return largest;
+  }
+
+  /// Of the constraints' position level, in the least-squares sense.
+  double violation() const {
+    double r2 = 0;
+    for (int a = node_rows_; a < size_; ++a) r2 += r_[rows_[a]] * r_[rows_[a]];
+    return std::isfinite(r2) ? std::sqrt(r2) : HUGE_VAL;
+  }
+
+  /// (CᵀC + μ1) δ = Cᵀr with the constraints' rows C of the position level.
+  std::optional<VecX> least_squares_correction() {
+    std::vector<Eigen::Triplet<double>> constraints;
+    const Eigen::SparseMatrix<double> m = matrix();
+    for (int column = 0; column < size_; ++column)
+      for (Eigen::SparseMatrix<double>::InnerIterator entry(m, column); entry; ++entry)
+        if (entry.row() >= node_rows_ && entry.row() < size_)
+          constraints.emplace_back(entry.row() - node_rows_, column, entry.value());
+    Eigen::SparseMatrix<double> c(size_ - node_rows_, size_), identity(size_, size_);
+    c.setFromTriplets(constraints.begin(), constraints.end());
+    identity.setIdentity();
+    factors_.factor(c.transpose() * c + kDamping * identity, Watch(cancel_));
+    if (!factors_.regular()) return std::nullopt;
+    VecX r(size_ - node_rows_), delta = VecX::Zero(2 * size_);
+    for (int a = node_rows_; a < size_; ++a) r(a - node_rows_) = r_[rows_[a]];
+    delta.head(size_) = factors_.solve(c.transpose() * r);
+    if (!delta.allFinite()) return std::nullopt;
+    return delta;
+  }
+
+  /// The constraints that stay violated, largest violation of each element first; `at_start`: the
+  /// largest one of the input.
+  std::string contradictions(double at_start) const {
+    const double largest = largest_violation();
+    if (!(largest > kContradicted * at_start)) return {};
     return "these constraints contradict each other; the least violation that was found leaves" +
            violations(r_, largest) +
            "\n  hint: correct the positions or orientations given to one of them, or remove one";
   }
 
-  /// The largest load of the initial stiffness on a node.
-  double restoring_load() const {
-    double largest = 0;
-    for (std::size_t k = 0; k < model_.structural.size(); ++k) {
-      const StructuralNode& node = model_.structural[k];
-      if (node.is_dummy()) continue;
-      for (int i = 0; i < 3; ++i) {
-        const double moved = state_.y[node.first + i] - start_.y[node.first + i];
-        largest = std::max(largest, node.assembly_position_stiffness * std::abs(moved));
-      }
-    }
-    return largest;
+  /// Where the constraints agree; Newton's method does not get there from the input.
+  std::string met_elsewhere() const {
+    const auto moved = [&](const StructuralNode& node) -> Vec3 {
+      return Vec3(state_.y.data() + node.first) - Vec3(start_.y.data() + node.first);
+    };
+    const StructuralNode* farthest = nullptr;
+    for (const StructuralNode& node : model_.structural)
+      if (!node.is_dummy() && (!farthest || moved(node).norm() > moved(*farthest).norm()))
+        farthest = &node;
+    const char* const hint =
+        "\n  hint: give the nodes positions and orientations nearer to the assembled ones";
+    constexpr double kMoved = 1e-9;
+    if (!farthest || moved(*farthest).norm() < kMoved)
+      return std::string("the constraints can be met with orientations far from the input") + hint;
+    const Vec3 x(state_.y.data() + farthest->first);
+    char text[120];
+    std::snprintf(text, sizeof text, " would be at (%.3g, %.3g, %.3g), %.3g away from its input",
+                  x(0), x(1), x(2), moved(*farthest).norm());
+    return "the constraints can be met far from the input: " +
+           model_.row_text(farthest->equilibrium).first + text + hint;
   }
 
   /// When the input contradicts nothing else.
@@ -375,7 +433,8 @@ class Assembly {
     return r;
   }
 
-  static constexpr double kCompliance = 1e-6;  ///< [1/N, with the initial stiffness in N/m]
+  static constexpr double kDamping = 1e-6;       ///< µ
+  static constexpr double kContradicted = 1e-3;  ///< part of the input's violation that stays
 
   const Model& model_;
   State& state_;

@@ -97,6 +97,57 @@ TEST(InitialAssembly, NamesRedundantConstraints) {
   EXPECT_THAT(message, HasSubstr("jacobian, 1e-12"));
 }
 
+/// A spherical hinge holds the nodes 1 m apart.
+std::string failure_of_hinge_and_distance(const std::string& distance) {
+  return failure(deck(kTwoNodes,
+                      body(1) + body(2) +
+                          "joint: 1, clamp, 1, node, node;\n"
+                          "joint: 2, spherical hinge, 1, 1.,0.,0., 2, null;\n"
+                          "joint: 3, distance, 1, 2, const, " +
+                          distance + ";\n",
+                      2, 3));
+}
+
+TEST(InitialAssembly, NamesADistanceThatAHingeHoldsAlready) {
+  const std::string message = failure_of_hinge_and_distance("1.");
+  EXPECT_THAT(message, AllOf(HasSubstr("follow from each other"), HasSubstr("joint 3 (distance)"),
+                             HasSubstr("joint 2 (spherical hinge), position constraint 1")));
+  EXPECT_THAT(message, Not(HasSubstr("joint 1")));
+}
+
+/// A hinge holds 1 m what a distance wants to be 2 m: the hinge opens by h, the points lie g beside
+/// the direction's end, whose length is 1 - w. h + g + 2 w = 1, h² + g² + w² least: 1/6, 1/6, 1/3.
+TEST(InitialAssembly, TellsTheLeastViolation) {
+  const std::string message = failure_of_hinge_and_distance("2.");
+  EXPECT_THAT(message, AllOf(HasSubstr(
+                           "contradict each other; the least violation that was found leaves\n"
+                           "  joint 2 (spherical hinge), position constraint 1: off by 0.167\n"
+                           "  joint 3 (distance), unit length of the direction: off by 0.333\n")));
+}
+
+/// Newton's method goes astray from here.
+TEST(InitialAssembly, TellsWhereConstraintsCanBeMet) {
+  const std::string message = failure(
+      deck("structural: 1, dynamic, null, eye, null, null;\n"
+           "structural: 2, dynamic, 1.,0.,0., eye, null, null;\n"
+           "structural: 3, dynamic, 0.,-1.,.5, eye, null, null;\n",
+           body(1) + body(2) + body(3) +
+               "joint: 1, clamp, 1, node, node;\n"
+               "joint: 2, revolute hinge, 2, 1.,-1.,1., 3, -1.,.5,-1.;\n"
+               "joint: 3, distance, 1, position, 0.,0.,-1., 2, position, .5,.5,-1., const, 2.;\n",
+           3, 3));
+  const std::string told =
+      "the constraints can be met far from the input: structural node 3 would ";
+  ASSERT_THAT(message, AllOf(HasSubstr(told), HasSubstr("hint: give the nodes positions")));
+  double x = 0, y = 0, z = 0, moved = 0;
+  ASSERT_EQ(std::sscanf(message.c_str() + message.find(told) + told.size(),
+                        "be at (%lf, %lf, %lf), %lf away", &x, &y, &z, &moved),
+            4)
+      << message;
+  EXPECT_NEAR((Vec3(x, y, z) - Vec3(0, -1, .5)).norm(), moved, .01);
+  EXPECT_GT(moved, 1);
+}
+
 /// A quarter of a turn; a gap of five times the arm; the same in millimetres, where the springs of
 /// the nodes hold with thousands.
 TEST(InitialAssembly, AsksForTheIterationsThatAreMissing) {
