@@ -19,6 +19,8 @@ class EvaluationWatch {
   EvaluationWatch(const EvaluationWatch&) = delete;
   EvaluationWatch& operator=(const EvaluationWatch&) = delete;
 
+  static constexpr int kOfElement = 4;  ///< evaluations that one element counts for
+
   /// So many drives, functions or terms of a series were evaluated, a tenth of a microsecond each
   /// or so.
   static void count(int evaluations) {

@@ -151,10 +151,9 @@ class Assembly {
       }
     }
     const EvaluationWatch watch(interruption_);
-    constexpr int kOfOne = 4;  // evaluations
     for (const ElementRef& e : elements_) {
       e.set->assembly_residual(c, e.index, r_.data(), r_rate_.data());
-      EvaluationWatch::count(kOfOne);
+      EvaluationWatch::count(EvaluationWatch::kOfElement);
     }
   }
 

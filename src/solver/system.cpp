@@ -25,11 +25,11 @@ void add_external_loads(const EvalContext& context, std::vector<double>& r) {
 /// Between them a computation that is not wanted any more can end.
 template <class Action>
 void each_few(ElementRange range, Action action) {
-  constexpr int kFew = 64, kOfOne = 4;  // evaluations
+  constexpr int kFew = 64;
   for (int first = range.first; first < range.last; first += kFew) {
     const int last = std::min(first + kFew, range.last);
     action({first, last});
-    EvaluationWatch::count(kOfOne * (last - first));
+    EvaluationWatch::count(EvaluationWatch::kOfElement * (last - first));
   }
 }
 
