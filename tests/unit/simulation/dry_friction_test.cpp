@@ -48,6 +48,46 @@ end: elements;
 
 const char* const kCoulomb = "discrete coulomb, \"mu\"";
 
+/// A body of 2 kg that swings on a rough rail along x, by a ring .1 m above its centre of mass.
+/// `node`: place of its node below the ring.
+std::string swinging_body(const std::string& node, const std::string& offset,
+                          const std::string& centre) {
+  return solver_block(1e-3) +
+         R"(begin: control data; structural nodes: 2; rigid bodies: 1; joints: 2; gravity;
+end: control data;
+scalar function: "mu", const, .3;
+begin: nodes;
+  structural: 1, static, null, eye, null, null;
+  structural: 2, dynamic, )" +
+         node + R"(, eye, 1.,0.,0., null;
+end: nodes;
+begin: elements;
+  body: 2, 2, 2., )" +
+         centre + R"(, diag, .1,.2,.3;
+  joint: 1, clamp, 1, node, node;
+  joint: 2, in line, 1, null, 1, 0.,0.,-1., 3, 1.,0.,0., 2, )" +
+         offset + R"(friction, modlugre, 1000., 1., .1, .5, "mu", simple;
+  gravity: uniform, 0.,.6,-.8, const, 10.;
+end: elements;
+)";
+}
+
+// The ring is at the node, or beside it: the same body moves the same way, but for the error of the
+// steps. (The reference solver ignores the friction of a joint with an offset.)
+TEST(DryFriction, RingBesideTheNodeHasTheFrictionOfOneAtTheNode) {
+  DeckRun at(swinging_body("null", "", "0.,0.,-.1"));
+  DeckRun beside(swinging_body(".02,.05,-.2", "offset, -.02,-.05,.2, ", "-.02,-.05,.1"));
+  ASSERT_TRUE(at.ready());
+  ASSERT_TRUE(beside.ready());
+  at.step(300);
+  beside.step(300);
+  const Vec3 ring = beside.node(2).x + beside.node(2).R * Vec3(-.02, -.05, .2);
+  EXPECT_LT((ring - at.node(2).x).norm(), 1e-6);
+  EXPECT_LT((beside.node(2).R - at.node(2).R).norm(), 1e-5);
+  EXPECT_LT(at.node(2).x(0), .29);                // without friction .3 m
+  EXPECT_GT(std::abs(at.node(2).R(0, 2)), 1e-2);  // friction at the ring pitches the body
+}
+
 TEST(DryFriction, BlockStopsWhereTheClosedFormSaysAndStays) {
   constexpr double h = 1e-3;
   DeckRun run(block_on_rail("1.", kCoulomb, "0."));
