@@ -17,16 +17,22 @@ from .errors import Unavailable
 from .rpc import PARTING
 
 # The shell ends the daemon when this process writes a line, closes the pipe or dies, however it dies; its own end is that of the daemon.
-# Where nobody wrote a line nobody is left to remove the folder, $0.
+# Where nobody wrote a line nobody is left to remove the folder, $0, also when the daemon ended before.
 _KEEPER = r'''
 exec 3<&0
 "$@" </dev/null 3<&- &
 child=$! left=
 trap left=1 HUP
 (read -r _ <&3 || kill -HUP "$$"; kill "$child") 2>/dev/null &
+reader=$!
 wait "$child"
 code=$?
-[ -z "$left" ] || { wait "$child"; rm -rf "$0"; }
+if [ -n "$left" ]; then
+  wait "$child"
+  rm -rf "$0"
+elif kill "$reader" 2>/dev/null; then
+  (read -r _ <&3 || rm -rf "$0") &
+fi
 exit "$code"
 '''
 
@@ -118,7 +124,7 @@ class LocalServer(Server):
         self._stop()
 
     def __repr__(self) -> str:
-        state = "running" if self._stop.alive else "ended"
+        state = "running" if self._stop.alive and self._daemon.process.poll() is None else "ended"
         return f"<mbcosim.Server private, {state}, {self.address}>"
 
 

@@ -4,12 +4,14 @@ Every access asks the server; to follow values over time use Simulation.simulate
 """
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator, Mapping, MutableMapping
 from typing import TYPE_CHECKING, Any, Optional, Union
 
 import numpy as np
+import numpy.typing as npt
 
-from mbcosim.v1 import common_pb2
+from mbcosim.v1 import common_pb2, simulations_pb2 as pb
 
 from .words import UnknownName, after_number, remedy
 
@@ -37,6 +39,40 @@ def short_text(variable: common_pb2.Variable) -> str:
     return f"{size}{unit}{frame}: {variable.description}"
 
 
+class Reading(npt.NDArray[np.float64]):
+    """What a variable was when it was asked for; inputs are set by assigning a whole value."""
+
+    def __setitem__(self, key: Any, value: Any) -> None:
+        if not self.flags.writeable:
+            raise ValueError("what was read is a copy, to write into it would not change the model: assign a whole value, load = node.load.copy(); "
+                             "load[1] = 5; node.load = load")
+        usual: Any = super()
+        usual.__setitem__(key, value)
+
+    def __array_wrap__(self, array: Any, *_: Any) -> Any:
+        return np.asarray(array)[()]  # what is computed from it is a usual array or number
+
+    def __repr__(self) -> str:
+        return repr(np.asarray(self))
+
+    def _as_a_sum(self, _: object) -> Any:
+        return NotImplemented  # so that `nodes[2].load += x` assigns the sum
+
+    __iadd__: Any = _as_a_sum
+    __isub__: Any = _as_a_sum
+    __imul__: Any = _as_a_sum
+    __itruediv__: Any = _as_a_sum
+
+
+def reading(value: Value) -> Value:
+    """`value`, where it is an array as one that cannot be written into."""
+    if not isinstance(value, np.ndarray):
+        return value
+    kept = value.view(Reading)
+    kept.flags.writeable = False
+    return kept
+
+
 class Part:
     """A node or an element: its variables are attributes, by their names in the model (`X`, `Fz`) or by words (`position`, `force`).
 
@@ -57,8 +93,7 @@ class Part:
     @property
     def variables(self) -> dict[str, common_pb2.Variable]:
         """`mbcosim.v1.Variable` by its name within the part."""
-        size = len(self.prefix)
-        return {name[size:]: variable for name, variable in self._simulation.variables.items() if name.startswith(self.prefix)}
+        return dict(self._simulation._index().own(self.prefix))
 
     def _words(self, own: Mapping[str, Any]) -> dict[str, list[str]]:
         """What may be read, and which variables it stands for."""
@@ -83,7 +118,7 @@ class Part:
             raise AttributeError(word)
         names = self._resolve(word)
         read: dict[str, Value] = self._simulation.read(names)
-        return read[names[0]] if len(names) == 1 and word not in _VECTORS else np.array([read[name] for name in names])
+        return reading(read[names[0]] if len(names) == 1 and word not in _VECTORS else np.array([read[name] for name in names]))
 
     def __setattr__(self, word: str, value: Value) -> None:
         names = self._resolve(word)
@@ -154,15 +189,21 @@ class Variables(Mapping[str, Value]):
 
     def __init__(self, simulation: Simulation, causalities: Optional[tuple[int, ...]], what: str) -> None:
         self._simulation, self._what = simulation, what
-        self._names = [name for name, variable in simulation.variables.items() if causalities is None or variable.causality in causalities]
+        self._names = {name: variable for name, variable in simulation.variables.items() if causalities is None or variable.causality in causalities}
+        self._ends: dict[str, list[str]] = {}
+        for name in self._names:
+            self._ends.setdefault(name.split(".", 1)[-1], []).append(name)
+
+    def _called(self, key: str) -> list[str]:
+        if key in self._names:
+            return [key]
+        index = self._simulation._index()
+        found = [name for prefix in index.named.get(key, ()) for word in index.own(prefix) if (name := prefix + word) in self._names]
+        return found or self._ends.get(key, [])
 
     def name(self, key: str) -> str:
         """The variable's full name."""
-        if key in self._names:
-            return key
-        parts = [part.prefix for part in _all_parts(self._simulation) if part.name == key]
-        found = [name for name in self._names if any(name.startswith(prefix) for prefix in parts)]
-        found = found or [name for name in self._names if name.split(".", 1)[-1] == key]
+        found = self._called(key)
         if len(found) == 1:
             return found[0]
         if found:
@@ -171,7 +212,10 @@ class Variables(Mapping[str, Value]):
 
     def __getitem__(self, key: str) -> Value:
         name = self.name(key)
-        return self._simulation.read([name])[name]
+        return reading(self._simulation.read([name])[name])
+
+    def __contains__(self, key: object) -> bool:
+        return isinstance(key, str) and len(self._called(key)) == 1
 
     def __iter__(self) -> Iterator[str]:
         return iter(self._names)
@@ -180,11 +224,10 @@ class Variables(Mapping[str, Value]):
         return len(self._names)
 
     def _ipython_key_completions_(self) -> list[str]:
-        return [*self._names, *(part.name for part in _all_parts(self._simulation) if part.name)]
+        return [*self._names, *self._simulation._index().named]
 
     def __repr__(self) -> str:
-        known = self._simulation.variables
-        return "\n".join([f"<{len(self)} {self._what}s>", *(f"  {name}{short_text(known[name])}" for name in self._names)])
+        return "\n".join([f"<{len(self)} {self._what}s>", *(f"  {name}{short_text(variable)}" for name, variable in self._names.items())])
 
 
 class Inputs(Variables, MutableMapping[str, Value]):
@@ -200,42 +243,64 @@ class Inputs(Variables, MutableMapping[str, Value]):
         raise TypeError("inputs belong to the model; set them to zero instead")
 
 
-def _all_parts(simulation: Simulation) -> list[Part]:
-    return simulation._nodes() + simulation._elements()
+class _Index:
+    """The parts and variables of a model's description, found once."""
+
+    def __init__(self, simulation: Simulation, description: pb.ModelDescription) -> None:
+        self.description = description
+        nodes = [Part(simulation, f"node.{node.family}.{node.label}.", node.label, node.name, node.family, node.kind) for node in description.nodes]
+        elements = [Part(simulation, f"{e.family.replace(' ', '_')}.{e.label}.", e.label, e.name, e.family, e.type) for e in description.elements]
+        self.nodes, self.elements = Parts("nodes", nodes), Parts("elements", elements)
+        self.inputs, self.outputs = Inputs(simulation), Variables(simulation, None, "variable")
+        self.joints = Parts("joints", [part for part in elements if part.family == "joint"])
+        self.named: dict[str, list[str]] = {}  # prefixes of the parts that have a name
+        self._own: dict[str, dict[str, common_pb2.Variable]] = {part.prefix: {} for part in nodes + elements}
+        for part in nodes + elements:
+            if part.name:
+                self.named.setdefault(part.name, []).append(part.prefix)
+        for variable in description.variables:
+            for dot in re.finditer(r"\.", variable.name):
+                if (own := self._own.get(variable.name[:dot.end()])) is not None:
+                    own[variable.name[dot.end():]] = variable
+
+    def own(self, prefix: str) -> Mapping[str, common_pb2.Variable]:
+        """Variables of a part, by their names within it."""
+        return self._own.get(prefix, {})
 
 
 class ModelObjects:
     """The parts of a simulation's model."""
 
-    def _nodes(self: Any) -> list[Part]:
-        description = self._description or self.describe()
-        return [Part(self, f"node.{node.family}.{node.label}.", node.label, node.name, node.family, node.kind) for node in description.nodes]
+    _indexed: Optional[_Index] = None
 
-    def _elements(self: Any) -> list[Part]:
+    def _index(self: Any) -> _Index:
         description = self._description or self.describe()
-        return [Part(self, f"{e.family.replace(' ', '_')}.{e.label}.", e.label, e.name, e.family, e.type) for e in description.elements]
+        if self._indexed is None or self._indexed.description is not description:
+            self._indexed = _Index(self, description)
+        found: _Index = self._indexed
+        return found
 
     @property
     def nodes(self) -> Parts:
         """All nodes: `nodes[3]` is the structural one where several families use the label; `nodes["hydraulic", 3]` another."""
-        return Parts("nodes", self._nodes())
+        return self._index().nodes
 
     @property
     def elements(self) -> Parts:
         """All elements; `elements["beam", 3]` where several families use the label."""
-        return Parts("elements", self._elements())
+        return self._index().elements
 
     @property
     def joints(self) -> Parts:
         """The joints: `joints["hinge"].reaction`."""
-        return Parts("joints", [part for part in self._elements() if part.family == "joint"])
+        return self._index().joints
 
     @property
-    def inputs(self: Any) -> Inputs:
+    def inputs(self) -> Inputs:
         """What can be set: `inputs["valve"] = 0.2`."""
-        return Inputs(self)
+        return self._index().inputs
 
     @property
-    def outputs(self: Any) -> Variables:
+    def outputs(self) -> Variables:
         """What can be read, by name."""
-        return Variables(self, None, "variable")
+        return self._index().outputs

@@ -14,7 +14,7 @@ from .calls import Condition, SimulationCalls, SnapshotCalls, StepResult, Values
 from .coupling import Answer, Peer
 from .errors import Unavailable, translated
 from .histories import Histories
-from .objects import ModelObjects
+from .objects import ModelObjects, reading
 from .rpc import PARTING, USUAL, Blocking, Call, blocking, bounded, checked_timeout, fill_duration, parting, runs_calls, until_cancelled
 from .stepping import SharedStream, StepLine
 from .words import each_name, pick
@@ -91,7 +91,13 @@ class Simulation(Blocking, ModelObjects, Histories, Analysis, SimulationCalls[Sn
         return self._known
 
     def __getitem__(self, name: str) -> Any:
-        return self.read([name])[name]
+        return reading(self.read([name])[name])
+
+    def __contains__(self, name: object) -> bool:
+        return name in self.variables
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self.variables)
 
     def __setitem__(self, name: str, value: npt.ArrayLike) -> None:
         self.write({name: value})
