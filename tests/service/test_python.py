@@ -1,5 +1,6 @@
 """The Python client for daily use: a daemon of one's own, the model's parts as objects, histories, what-if, linear models, pictures."""
 import asyncio
+import collections
 import contextlib
 import functools
 import os
@@ -96,6 +97,22 @@ server.close()
 print(os.path.exists(folder), time.monotonic() - begin)
 os.kill(child, 9)
 """
+
+
+def test_a_private_daemon_that_ended_by_itself_leaves_nothing():
+    with subprocess.Popen([sys.executable, "-c", BREAKS_OFF], stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True) as child:
+        number, _, path = child.stdout.readline().partition(" unix:")
+        keeper, folder = int(number), os.path.dirname(path)
+        os.kill(daemon_of(types.SimpleNamespace(process_id=keeper)), signal.SIGKILL)
+        wait_for(lambda: not running(keeper))
+        assert os.path.exists(folder)  # its log
+        child.kill()
+    wait_for(lambda: not os.path.exists(folder))
+    with mbcosim.local() as server:
+        os.kill(daemon_of(server), signal.SIGKILL)
+        wait_for(lambda: "private, ended" in repr(server))
+        assert os.path.exists(os.path.dirname(server.address[len("unix:"):]))
+    assert not os.path.exists(os.path.dirname(server.address[len("unix:"):]))
 
 
 def test_a_private_daemon_is_that_of_the_process_that_started_it():
@@ -435,6 +452,60 @@ def test_inputs_are_set_by_the_names_of_their_nodes(server):
 LOAD, OTHER = "node.structural.2.load", "node.structural.1.load"
 
 
+@pytest.mark.parametrize("read", [lambda s: s.nodes[2].load, lambda s: s.nodes[2]["load"], lambda s: s.inputs[LOAD], lambda s: s[LOAD], lambda s: s.joints[2].reaction])
+def test_to_write_into_what_was_read_is_refused(swing, read):
+    """The model did not see it."""
+    with pytest.raises(ValueError, match="what was read is a copy, to write into it would not change the model: assign a whole value"):
+        read(swing)[1] = 5
+    with pytest.raises(ValueError, match="what was read is a copy"):
+        read(swing)[:3][1] = 5
+    assert repr(read(swing)) == repr(np.array(read(swing)))
+    mine = read(swing).copy()
+    mine[1] = 5
+    assert mine[1] == 5 and type(read(swing) + 1) is np.ndarray and type(read(swing).sum()) is np.float64
+
+
+def test_an_input_is_changed_by_a_sum(swing):
+    swing.nodes[2].load += [0, 1, 0, 0, 0, 0]
+    swing.inputs["structural.2.load"] *= 6
+    swing[LOAD] -= 1
+    swing[LOAD] /= 2
+    assert list(swing[LOAD]) == [-0.5, 2.5, -0.5, -0.5, -0.5, -0.5]
+
+
+def test_what_is_among_the_variables_can_be_asked(swing):
+    assert "time" in swing and "nope" not in swing and 0 not in swing
+    assert list(swing) == list(swing.variables) == list(swing.outputs)
+    assert "structural.2.load" in swing.inputs and "time" not in swing.inputs and 0 not in swing.inputs and "X" not in swing.outputs
+
+
+def test_parts_and_inputs_of_a_large_model_are_found_at_once(server):
+    """Each attribute looked through all variables, 10 ms where there are 39 000."""
+    labels, looks = range(1, 301), collections.Counter()
+    deck = decks.body().replace("structural nodes: 1; rigid bodies: 1;", f"structural nodes: {len(labels)}; rigid bodies: {len(labels)};")
+    deck = deck.replace("structural: 1, dynamic, null,", " ".join(f"structural: {k}, dynamic, {k}., 0., 0., eye, null, null;" for k in labels[1:])
+                        + " structural: 1, dynamic, 1., 0., 0.,")
+    deck = deck.replace("body: 1, 1, 1., null", " ".join(f"body: {k}, {k}, 1., null, eye;" for k in labels[1:]) + " body: 1, 1, 1., null")
+    with server.load_text(deck) as simulation:
+        class Counted(dict):
+            def items(self):
+                looks["all"] += 1
+                return super().items()
+
+            def __iter__(self):
+                looks["all"] += 1
+                return super().__iter__()
+
+        simulation.describe()
+        simulation._known = Counted(simulation._known)
+        for k in (1, 2, labels[-1]):
+            assert simulation.nodes[k].position[0] == k and simulation.inputs[f"structural.{k}.load"][0] == 0
+            assert simulation.elements["body", k].mass == 1.0 and "X" in simulation.nodes[k].variables
+        assert looks["all"] <= 2
+        simulation.describe()  # of which the parts are made anew
+        assert simulation.nodes[2].position[0] == 2
+
+
 @pytest.mark.parametrize("set_inputs, field", [
     (lambda s, values: s.write(values), "values.values"), (lambda s, values: s.step(inputs=values), "inputs.values"),
     (lambda s, values: s.run_until(0.1, inputs=values), "inputs.values"), (lambda s, values: s.simulate("time", steps=1, inputs=values), "inputs.values"),
@@ -607,6 +678,15 @@ def test_a_history_of_a_negative_number_of_steps_is_refused(swing, inputs):
     with pytest.raises(mbcosim.Error, match="`steps` must not be negative, got -1") as caught:
         swing.simulate(POSITION, steps=-1, inputs=inputs)
     assert caught.value.field == "steps"
+
+
+@pytest.mark.parametrize("inputs", [{}, {LOAD: lambda t: [0] * 6}])
+def test_how_far_a_history_goes_is_a_number(swing, inputs):
+    with pytest.raises(mbcosim.Error, match="is not a number"):
+        swing.simulate(until=float("nan"), inputs=inputs)
+    with pytest.raises(TypeError):
+        swing.simulate(steps=2.5, inputs=inputs)
+    assert swing.time == 0
 
 
 def test_a_history_is_a_table(swing, tmp_path):
@@ -829,6 +909,34 @@ def test_a_film_takes_a_path_and_tells_what_it_cannot_be(swing, tmp_path, monkey
         history.animate(save="film.mp4")
     with pytest.raises(ValueError, match="lines: no choice is called 9; choose from 1, 2"):
         history.animate(lines=[(1, 9)])
+
+
+@pytest.mark.parametrize("options, fault", [
+    *(({name: value}, f"`{name}` must be a positive number, got {value!r}")
+      for name in ("frames_per_second", "seconds") for value in (0, -1, float("nan"), float("inf"), "2")),
+    ({"lines": (1, 2)}, "lines: each must be a list of labels, got 1 in its place")])
+def test_a_film_that_cannot_be_is_refused(swing, options, fault):
+    pytest.importorskip("matplotlib").use("Agg")
+    with pytest.raises(ValueError, match=fault):
+        swing.simulate(steps=4).animate(**options)
+
+
+@pytest.mark.parametrize("options, fault", [
+    *(({name: value}, f"`{name}` must be a positive number, got {value!r}") for name in ("frames_per_second", "scale") for value in (0, -1, float("nan"))),
+    *(({"frames": count}, f"`frames` must be at least 2, got {count}") for count in (0, 1, -3))])
+def test_a_film_of_a_mode_that_cannot_be_is_refused(server, options, fault):
+    pytest.importorskip("matplotlib").use("Agg")
+    with server.load_text(OSCILLATOR) as simulation, pytest.raises(ValueError, match=fault):
+        simulation.modes().animate(1, **options)
+
+
+def test_a_percent_sign_in_a_folder_is_no_number_of_a_picture(swing, tmp_path):
+    pytest.importorskip("matplotlib").use("Agg")
+    folder = tmp_path / "50%"
+    folder.mkdir()
+    swing.simulate(until=0.2).animate(save=folder / "film.gif", frames_per_second=5)
+    swing.simulate(until=0.4).animate(save=folder / "f%02d.png", frames_per_second=5)
+    assert sorted(path.name for path in folder.iterdir()) == ["f00.png", "f01.png", "film.gif"]
 
 
 def test_a_bode_diagram_of_many_has_its_names_beside_it_and_no_noise(server, tmp_path):

@@ -1,6 +1,8 @@
 """Values over time with their units: what Simulation.simulate returns."""
 from __future__ import annotations
 
+import math
+import operator
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING, Any, Optional, Union
 
@@ -106,7 +108,7 @@ class History(Mapping[str, Array]):
         from . import plots
         return plots.plot_history(self, names, axes=axes, save=save)
 
-    def animate(self, *, lines: Any = None, view: Any = "auto", seconds: Optional[float] = None, frames_per_second: int = 25,
+    def animate(self, *, lines: Any = None, view: Any = "auto", seconds: Optional[float] = None, frames_per_second: float = 25,
                 save: Optional[Path] = None) -> Any:
         """Moves the points whose positions the history has; see plots.animate_history."""
         from . import plots
@@ -165,8 +167,10 @@ def _numbers(simulation: Simulation, inputs: Mapping[str, Input], time: float) -
 
 def _run(simulation: Any, names: list[str], inputs: Mapping[str, Input], end: Optional[float], steps: Optional[int], every: int,
          progress: bool, timeout: Optional[float]) -> History:
-    if steps is not None and steps < 0:
+    if steps is not None and operator.index(steps) < 0:
         raise bad_argument("steps", f"`steps` must not be negative, got {steps}")
+    if end is not None and math.isnan(end):
+        raise bad_argument("until", "`until` is not a number")
     rows, done, start = _Collector(simulation, names), 0, simulation.time
     total = float(steps) if end is None and steps is not None else float(end or 0.0) - start
     size = simulation.info.next_step_size

@@ -1,7 +1,9 @@
 """Pictures with matplotlib: histories, moving models, modes, Bode diagrams, root loci."""
 from __future__ import annotations
 
+import operator
 import os
+import re
 from collections.abc import Iterable, Sequence
 from typing import TYPE_CHECKING, Any, Optional, Union
 
@@ -10,13 +12,14 @@ import numpy.typing as npt
 
 from .access import Path
 from .histories import Array, History
-from .words import after_number, frequency_unit, needed, pick, seconds_in
+from .words import after_number, frequency_unit, needed, pick, positive, seconds_in
 
 if TYPE_CHECKING:
     from .analysis import Modes, StateSpace
 
 _VIEWS = {"xy": (0, 1), "xz": (0, 2), "yz": (1, 2)}
 _XYZ = ("x", "y", "z")
+_NUMBER = re.compile(r"(%\d*d)")  # of a picture, in the name of its file
 
 
 def pyplot(save: Optional[Path]) -> Any:
@@ -99,7 +102,7 @@ class _Scene:
         self._positions, self._unit = positions, unit
         self._plane = _plane(positions, view)
         places = {label: k for k, label in enumerate(labels)}
-        self._lines = [[pick(places, label, "lines") for label in line] for line in lines]
+        self._lines = [[pick(places, label, "lines") for label in line] for line in _lines(lines)]
         space = self._plane is None
         self.figure = plt.figure(figsize=(6.4, 5.2))
         self.axes = self.figure.add_subplot(projection="3d" if space else None)
@@ -134,6 +137,13 @@ class _Scene:
         self.axes.set_title(title)
 
 
+def _lines(lines: Iterable[Sequence[int]]) -> list[Sequence[int]]:
+    found = list(lines)
+    if any(isinstance(line, (int, str)) for line in found):
+        raise ValueError(f"lines: each must be a list of labels, got {found[0]!r} in its place: say [(1, 2, 3)] for one line")
+    return found
+
+
 def _plane(positions: Array, view: str) -> Optional[tuple[int, int]]:
     """Axes of the plane to draw; None: space. "auto" draws a plane where all stays in one that is parallel to two axes."""
     if view in _VIEWS:
@@ -150,13 +160,14 @@ def _plane(positions: Array, view: str) -> Optional[tuple[int, int]]:
     return first, second
 
 
-def _play(plt: Any, scene: _Scene, titles: Sequence[str], frames_per_second: int, save: Optional[Path]) -> Any:
+def _play(plt: Any, scene: _Scene, titles: Sequence[str], frames_per_second: float, save: Optional[Path]) -> Any:
     animation = needed("matplotlib.animation", "an animation", "matplotlib")
     file = None if save is None else os.fspath(save)
-    if file is not None and "%" in file:  # a picture for each frame
+    parts = [] if file is None else _NUMBER.split(file)
+    if len(parts) > 1:  # a picture for each frame
         for k, title in enumerate(titles):
             scene.show(k, title)
-            scene.figure.savefig(file % k, dpi=100)
+            scene.figure.savefig("".join(part % k if _NUMBER.fullmatch(part) else part for part in parts), dpi=100)
         plt.close(scene.figure)
         return None
     film = animation.FuncAnimation(scene.figure, lambda k: scene.show(k, titles[k]), frames=len(titles), interval=1000 / frames_per_second)
@@ -171,7 +182,7 @@ def _play(plt: Any, scene: _Scene, titles: Sequence[str], frames_per_second: int
 
 
 def animate_history(history: History, *, lines: Optional[Iterable[Sequence[int]]] = None, view: str = "auto",
-                    seconds: Optional[float] = None, frames_per_second: int = 25, save: Optional[Path] = None) -> Any:
+                    seconds: Optional[float] = None, frames_per_second: float = 25, save: Optional[Path] = None) -> Any:
     """Moves the nodes whose positions the history has, with the paths that they take.
 
     lines    labels of nodes that are joined by a line: [(1, 2, 3), (3, 4)]; default: all, in the order of their labels
@@ -181,9 +192,12 @@ def animate_history(history: History, *, lines: Optional[Iterable[Sequence[int]]
     Returns a matplotlib animation, for notebooks: `HTML(animation.to_jshtml())`; None when pictures were written.
     """
     plt = pyplot(save)
+    rate = positive("frames_per_second", frames_per_second)
+    if seconds is not None:
+        positive("seconds", seconds)
     labels, positions, unit = points(history)
     lasts = float(seconds if seconds is not None else (history.time[-1] - history.time[0]) * (seconds_in(history.time_unit) or 1.0))
-    count = max(2, min(len(history.time), int(round(lasts * frames_per_second)) + 1))
+    count = max(2, min(len(history.time), int(round(min(lasts * rate, len(history.time)))) + 1))
     chosen = np.searchsorted(history.time, np.linspace(history.time[0], history.time[-1], count)).clip(0, len(history.time) - 1)
     scene = _Scene(plt, positions[chosen], unit, labels, [labels] if lines is None else lines, view, True)
     titles = [f"{history.title + ', ' if history.title else ''}t = {history.time[k]:.3f} {after_number(history.time_unit)}" for k in chosen]
@@ -191,10 +205,14 @@ def animate_history(history: History, *, lines: Optional[Iterable[Sequence[int]]
 
 
 def animate_mode(modes: Modes, number: int, *, lines: Optional[Iterable[Sequence[int]]] = None, view: str = "auto", scale: float = 0.15,
-                 frames: int = 32, frames_per_second: int = 16, save: Optional[Path] = None) -> Any:
+                 frames: int = 32, frames_per_second: float = 16, save: Optional[Path] = None) -> Any:
     """Swings the model in one of its modes (counted from 1), enlarged: the largest displacement is `scale` of the model's size. For `lines`,
     `view`, `save` see animate_history."""
     plt = pyplot(save)
+    positive("frames_per_second", frames_per_second)
+    positive("scale", scale)
+    if operator.index(frames) < 2:
+        raise ValueError(f"`frames` must be at least 2, got {frames}")
     shape, base = modes.shape(number), modes.positions
     size = max(float(np.ptp(base, axis=0).max()), 1e-9)
     phases = np.exp(2j * np.pi * np.arange(frames) / frames)[:, None, None]

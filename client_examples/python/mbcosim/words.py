@@ -2,7 +2,10 @@
 from __future__ import annotations
 
 import difflib
+import math
 from typing import Any, Iterable, Optional
+
+import numpy as np
 
 
 class UnknownName(KeyError):
@@ -23,6 +26,13 @@ def each_name(names: Iterable[str], argument: str = "names") -> list[str]:
     if isinstance(names, str):
         raise TypeError(f"`{argument}` must be a list of names, got one by itself: say [{names!r}]")
     return list(names)
+
+
+def positive(name: str, value: object) -> float:
+    """A number that must be above zero and finite; `name`: of the argument."""
+    if not isinstance(value, (int, float, np.integer, np.floating)) or not 0 < value < math.inf:
+        raise ValueError(f"`{name}` must be a positive number, got {value!r}")
+    return float(value)
 
 
 def remedy(name: object, known: Iterable[object], most: int = 12) -> str:
