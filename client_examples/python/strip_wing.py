@@ -90,7 +90,7 @@ def fate(heights: example.Array) -> str:
 
 
 def main() -> None:
-    options = example.options(__doc__, "wing.png", steps=1000)
+    options = example.options(__doc__, "wing.png", steps=1000, least=5)
     with mbcosim.connect_or_start(options.address) as server:
         runs = {speed: fly(server, speed, options.steps, True) for speed in SPEEDS}
         plain = fly(server, SPEEDS[0], options.steps // 4, False)

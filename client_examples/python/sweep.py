@@ -82,9 +82,8 @@ def draw(path: str, drops: list[Drop], count: int) -> None:
 
 
 def main() -> None:
-    options = example.options(__doc__, "sweep.png", points="how many of each parameter; default: 8",
-                              scheduler="of a Dask cluster; default: threads of this process")
-    count = int(options.points or 8)
+    options = example.options(__doc__, "sweep.png", points=8, scheduler="of a Dask cluster; default: threads of this process")
+    count = options.points
     sinks, holes = np.linspace(1.0, 3.5, count), np.geomspace(1e-4, 4e-4, count)
     with mbcosim.connect_or_start(options.address) as server, dask_client(options.scheduler) as client:
         drops = client.gather(sweep(client, server.address, sinks.tolist(), holes.tolist()))

@@ -94,3 +94,22 @@ def test_two_daemons(address, tmp_path):
     """The halves fall as the whole does."""
     (fall, difference, exchanges), = run("two_daemons.py", address, tmp_path, "--steps", "60")
     assert fall > 0.3 and difference < 1e-7 and exchanges < 20
+
+
+@pytest.mark.parametrize("script, least", [("controllers.py", 1), ("stiff_peer.py", 1), ("strip_wing.py", 5), ("two_daemons.py", 1), ("wind_on_chain.py", 1)])
+def test_the_fewest_steps_are_enough_and_fewer_are_refused(address, tmp_path, script, least):
+    run(script, address, tmp_path, "--steps", str(least))
+    for steps in (least - 1, -1, 1.5, 10**12):
+        assert refusal(script, "--steps", str(steps)) == f"argument --steps: expected a whole number from {least} to 10000000, got '{steps}'"
+
+
+def test_a_picture_that_cannot_be_written_is_told_before_the_run(tmp_path):
+    assert refusal("wind_on_chain.py", "--plot", "a.xyz") == "argument --plot: 'a.xyz' names no kind of picture: expected an ending like .png, .pdf, .svg"
+    folder = tmp_path / "none"
+    assert refusal("wind_on_chain.py", "--plot", str(folder / "a.png")) == f"argument --plot: there is no folder '{folder}' to write a picture into"
+
+
+def refusal(script, *options):
+    done = subprocess.run([sys.executable, os.path.join(SCRIPTS, script), *options], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, timeout=60)
+    assert done.returncode == 2 and done.stdout == ""
+    return done.stderr.splitlines()[-1].partition(f"{script}: error: ")[2]
