@@ -54,6 +54,17 @@ class Run {
  public:
   Run(client::Simulation& simulation, precice::Participant& participant, Surface& surface)
       : simulation_(simulation), participant_(participant), surface_(surface) {}
+  Run(const Run&) = delete;
+  Run& operator=(const Run&) = delete;
+  /// The simulation may be another client's: the checkpoint goes also after a failure.
+  ~Run() {
+    if (!checkpoint_) return;
+    try {
+      simulation_.delete_snapshot(*checkpoint_);
+    } catch (const client::Error& error) {
+      std::fprintf(stderr, "warning: the checkpoint is left: %s\n", error.what());
+    }
+  }
 
   void until_the_end() {
     if (participant_.requiresInitialData()) surface_.write();
@@ -65,7 +76,6 @@ class Run {
       if (participant_.isTimeWindowComplete()) ++windows_;
     }
     participant_.finalize();
-    if (checkpoint_) simulation_.delete_snapshot(*checkpoint_);
     std::printf("%ld time windows, %ld steps, %ld times back\n", windows_, steps_, returns_);
   }
 
