@@ -28,7 +28,9 @@ std::string read_file(const std::string& folder, const std::string& name) {
 ReductionJob read_command(const ReduceCommand& command) {
   ReductionJob job;
   if (!command.job.empty()) read_job(command.job, read_file(".", command.job), job);
+  ReductionNames names;
   for (const auto& [name, value] : command.options) {
+    names.add(name);
     job.set(name, value);
     if (const auto file = job.files.find(name); file != job.files.end()) {
       if (value.empty()) refuse_reduction("--" + name + ": a file's name expected");

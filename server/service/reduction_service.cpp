@@ -1,5 +1,6 @@
 #include "service/reduction_service.h"
 
+#include <cmath>
 #include <optional>
 
 #include "input/sources.h"
@@ -25,20 +26,28 @@ ReductionJob read_request(const v1::ReduceHeader& header, const BundleSource& fi
     throw Refusal(v1::REASON_BAD_ARGUMENT, "the job file \"" + header.main_file().substr(0, 100) +
                                                "\" is not among the files");
   ReductionJob job;
+  ReductionNames names;
   read_job(header.main_file(), *text, job);
   if (header.interface_nodes_size() > 0) {
+    names.add("interface");
     job.options.interface_nodes.clear();
     for (const int label : header.interface_nodes())
       job.options.interface_nodes.push_back(std::to_string(label));
   }
-  if (header.has_fixed_interface_modes())
+  if (header.has_fixed_interface_modes()) {
+    names.add("modes");
     job.set("modes", std::to_string(header.fixed_interface_modes()));
+  }
   if (header.has_highest_frequency()) {
-    if (!(header.highest_frequency() > 0))
+    if (!(header.highest_frequency() > 0 && std::isfinite(header.highest_frequency())))
       throw Refusal(v1::REASON_BAD_ARGUMENT, "`highest_frequency` must be positive");
+    names.add("max-frequency");
     job.options.max_frequency = header.highest_frequency();
   }
-  for (const auto& [name, value] : header.options()) job.set(name, value);
+  for (const auto& [name, value] : header.options()) {
+    names.add(name);
+    job.set(name, value);
+  }
   return job;
 }
 

@@ -146,6 +146,9 @@ int BasisBuilder::mode_count(Structure& structure) const {
     throw ReductionError(ErrorKind::not_converged,
                          "the modes below the highest frequency could not be counted");
   check_count_of_shapes(interface_.size() + static_cast<std::size_t>(count));
+  if (count == 0 && !is_static(options_.basis))
+    refuse_reduction("the body has no normal mode below the highest frequency",
+                     "raise it, or ask for a number of modes");
   return count;
 }
 
@@ -169,26 +172,27 @@ void BasisBuilder::add_modes(Structure& structure, BasisShapes& basis) {
   basis.shapes.rightCols(count) = structure.embedded(modes.shapes);
 }
 
-/// As many eigenvalues lie below the middle of the widest upper gap as were found there.
+/// As many eigenvalues lie below the middle of the widest upper gap as were found there; equal
+/// ones have none between them.
 void BasisBuilder::check_count(Structure& structure, const NormalModes& modes) {
   report("count of the modes", 0);
   const int n = static_cast<int>(modes.squares.size());
-  int at = n - 1;  // eigenvalues below index `at` are counted
+  constexpr double kEqual = 1e-6;  // relative
+  int at = 0;                      // eigenvalues below index `at` are counted
   double widest = 0;
-  for (int k = n - 1; k > std::max(0, n - 5); --k) {
+  for (int k = n - 1; k > 0 && (k > n - 5 || at == 0); --k) {
     const double gap = modes.squares(k) / modes.squares(k - 1) - 1;
-    if (gap > 4 * widest) {
+    if (gap > std::max(kEqual, 4 * widest)) {
       widest = gap;
       at = k;
     }
   }
   const double mu =
-      n == 1 ? 0.5 * modes.squares(0) : std::sqrt(modes.squares(at) * modes.squares(at - 1));
-  const int expected = n == 1 ? 0 : at, counted = structure.count_modes_below(mu);
-  if (counted >= 0 && counted != expected)
+      at == 0 ? 0.5 * modes.squares(0) : std::sqrt(modes.squares(at) * modes.squares(at - 1));
+  const int counted = structure.count_modes_below(mu);
+  if (counted >= 0 && counted != at)
     warnings_.push_back("the model has " + std::to_string(counted) + " normal modes below " +
-                        std::to_string(hertz(mu)) + " Hz, " + std::to_string(expected) +
-                        " were found");
+                        std::to_string(hertz(mu)) + " Hz, " + std::to_string(at) + " were found");
 }
 
 Structure& BasisBuilder::omitted() {

@@ -103,6 +103,19 @@ double share(const std::string& name, const std::string& value) {
   return number;
 }
 
+double above_zero(const std::string& name, const std::string& value) {
+  const double number = real(name, value);
+  if (!(number > 0))
+    refuse_reduction(name + ": a number above zero expected, got `" + value + "`");
+  return number;
+}
+
+/// Takes the place of a highest frequency that another source gave.
+void set_modes(const std::string& value, ReductionOptions& options) {
+  options.modes = whole("modes", value);
+  options.max_frequency = 0;
+}
+
 double shift(const std::string& value) {
   const double number = real("shift", value);
   if (number > 0)
@@ -154,9 +167,9 @@ void ReductionJob::set(const std::string& name, const std::string& value) {
   else if (name == "components")
     set_components(value, options);
   else if (name == "modes")
-    options.modes = whole(name, value);
+    set_modes(value, options);
   else if (name == "max-frequency")
-    options.max_frequency = real(name, value);
+    options.max_frequency = above_zero(name, value);
   else if (name == "frame")
     set_frame(value, options);
   else if (name == "inertia")
@@ -181,7 +194,15 @@ void ReductionJob::set(const std::string& name, const std::string& value) {
     refuse_reduction("unknown option `" + name + "`");
 }
 
+void ReductionNames::add(const std::string& name) {
+  if (!names_.insert(name).second) refuse_reduction("`" + name + "` is given twice");
+  if (names_.contains("modes") && names_.contains("max-frequency"))
+    refuse_reduction("both `modes` and `max-frequency` say how many normal modes there are",
+                     "give one of them");
+}
+
 void read_job(const std::string& name, std::string_view text, ReductionJob& job) {
+  ReductionNames names;
   int number = 0;
   while (!text.empty()) {
     const std::size_t end = std::min(text.find('\n'), text.size());
@@ -193,8 +214,9 @@ void read_job(const std::string& name, std::string_view text, ReductionJob& job)
     const std::string place = name + ":" + std::to_string(number) + ": ";
     if (equal == std::string_view::npos) refuse_reduction(place + "`name = value` expected");
     try {
-      job.set(std::string(trimmed(line.substr(0, equal))),
-              std::string(trimmed(line.substr(equal + 1))));
+      const std::string option(trimmed(line.substr(0, equal)));
+      names.add(option);
+      job.set(option, std::string(trimmed(line.substr(equal + 1))));
     } catch (const ReductionError& error) {
       throw ReductionError(error.kind, place + error.what());
     }

@@ -9,6 +9,7 @@
 #pragma once
 
 #include <map>
+#include <set>
 #include <string>
 #include <string_view>
 
@@ -30,6 +31,17 @@ struct ReductionOptionHelp {
 };
 /// All names that `set` takes.
 const std::vector<ReductionOptionHelp>& reduction_option_help();
+
+/// What one source says, a job file, a command line or a request: each name once, and the number of
+/// modes in one way.
+class ReductionNames {
+ public:
+  /// Throws ReductionError.
+  void add(const std::string& name);
+
+ private:
+  std::set<std::string, std::less<>> names_;
+};
 
 /// Adds the lines of `text` to `job`; `name` is used in messages.
 void read_job(const std::string& name, std::string_view text, ReductionJob& job);

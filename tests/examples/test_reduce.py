@@ -181,6 +181,8 @@ def test_options_of_the_eigensolution(folder):
     (["--normal", "most"], "unknown choice"),
     (["--basis", "fancy"], "unknown basis `fancy`"), (["--interface", "77"], "the model has no node 77"),
     (["--mass", "missing.mtx"], "cannot open"), (["--mass", ""], "--mass: a file's name expected"), (["--basis", "constrained"], "6 rigid motions"),
+    (["--basis", "free", "--max-frequency", "1e-3"], "no normal mode below the highest frequency"),
+    (["--modes", "3", "--max-frequency", "10"], "both `modes` and `max-frequency` say"),
     (["--modes", "many"], "modes: a number expected"), (["--frame", "somewhere"], "unknown frame")])
 def test_refusals(folder, options, message):
     run = mbcosim("reduce", folder / "beam.job", "-o", folder / "beam.fem", *options)

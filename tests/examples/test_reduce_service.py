@@ -19,9 +19,9 @@ def server(tmp_path):
 
 def test_same_file_as_the_command_line(server, folder):  # noqa: F811
     phases = []
-    report, data = server.reduce(folder / "beam.job", basis="craig-bampton", interface="1, 9", modes=4,
+    report, data = server.reduce(folder / "beam.job", basis="craig-bampton", interface=[1, 9], modes=4, diagonalize=False,
                                  progress=lambda phase, fraction: phases.append(phase))
-    known, _ = reduced(folder, "--basis", "craig-bampton", "--interface", "1,9", "--modes", "4")
+    known, _ = reduced(folder, "--basis", "craig-bampton", "--interface", "1,9", "--modes", "4", "--diagonalize", "no")
     assert data == (folder / "beam.fem").read_bytes()
     assert list(report.frequencies) == known["frequencies_hz"]
     assert (report.modes, report.rigid_motions, report.removed_shapes) == (10, 6, 6)
@@ -31,7 +31,9 @@ def test_same_file_as_the_command_line(server, folder):  # noqa: F811
 
 
 @pytest.mark.parametrize("options, message", [({"basis": "fancy"}, "unknown basis"), ({"interface": "77"}, "no node 77"),
-                                              ({"colour": "red"}, "unknown option"), ({"mass": "other.mtx"}, "other.mtx")])
+                                              ({"colour": "red"}, "unknown option"), ({"mass": "other.mtx"}, "other.mtx"),
+                                              ({"basis": "free", "max_frequency": 1e-3}, "no normal mode below"),
+                                              ({"modes": 2, "max_frequency": 10}, "both `modes` and `max-frequency`")])
 def test_refusals(server, folder, options, message):  # noqa: F811
     with pytest.raises(mbcosim.Error, match=message) as refused:
         server.reduce(folder / "beam.job", **options)

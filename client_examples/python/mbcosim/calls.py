@@ -116,6 +116,13 @@ def _grants(given: Iterable[pb.Grant]) -> list_of[pb.Grant]:
     return _made(given, pb.Grant, '`grants` must be a list of grants, [mbcosim.grant("*", "observe")] say')
 
 
+def _job_option(value: object) -> str:
+    """As job files of the reduction have it."""
+    if isinstance(value, (bool, np.bool_)):
+        return "yes" if value else "no"
+    return ", ".join(map(str, value)) if isinstance(value, (list_of, tuple)) else str(value)
+
+
 def _symbol(value: Symbol) -> pb.SymbolValue:
     """`mbcosim.v1.SymbolValue`."""
     if isinstance(value, (bool, np.bool_)):
@@ -296,12 +303,12 @@ class ServerCalls(Generic[SimulationKind]):
                **options: object) -> Calls[tuple[reduction_pb2.ReduceReport, bytes]]:
         """Reduces a finite element model: `job` is a job file on this machine, beside the files that it names.
 
-        Options of the job can be given here: basis="complement", max_frequency=100. `progress(phase, fraction)` is called on the
+        Options of the job can be given here: basis="complement", interface=[1, 9], max_frequency=100. `progress(phase, fraction)` is called on the
         way. Returns (`mbcosim.v1.ReduceReport`, bytes of the FEM data file).
         """
         main, files = bundle.collect_job(job)
         header = reduction_pb2.ReduceHeader(main_file=main)
-        header.options.update({name.replace("_", "-"): str(value) for name, value in options.items()})
+        header.options.update({name.replace("_", "-"): _job_option(value) for name, value in options.items()})
         reports: list[reduction_pb2.ReduceReport] = []
         data = bytearray()
 

@@ -364,6 +364,27 @@ TEST(ReduceModes, HighestFrequencyInsteadOfANumber) {
   EXPECT_EQ(reduced(space_beam(), o).report.normal_modes, 3);
 }
 
+TEST(ReduceModes, NoneBelowTheHighestFrequencyIsARefusal) {
+  ReductionOptions o = options_of(ReductionBasis::free_modes, 0);
+  o.max_frequency = 1e-3;
+  EXPECT_THAT(refusal(space_beam(), o), HasSubstr("no normal mode below the highest frequency"));
+  o = options_of(ReductionBasis::craig_bampton, 0, {"1", "9"});
+  o.max_frequency = 1e-3;
+  const Reduction r = reduced(space_beam(), o);
+  EXPECT_EQ(r.report.normal_modes, 0);
+  EXPECT_EQ(r.report.static_shapes, 12);
+}
+
+TEST(ReduceModes, EqualFrequenciesAreCountedTogether) {
+  const FeModel point = make_fe_model({"1"}, MatX::Zero(3, 1), {{0, 0}, {0, 1}},
+                                      assembled(2, {{0, 0, 1.0}, {1, 1, 1.0}}),
+                                      assembled(2, {{0, 0, 100.0}, {1, 1, 100.0}}));
+  const Reduction r = reduced(point, options_of(ReductionBasis::constrained_modes, 2));
+  expect_omegas(r, {10, 10}, 1e-12);
+  for (const std::string& warning : r.report.warnings)
+    EXPECT_THAT(warning, Not(HasSubstr("were found")));
+}
+
 TEST(ReduceModes, EffectiveMassesAddUpToTheMass) {
   const Reduction r =
       reduced(clamped(spring_chain(5), "1"), options_of(ReductionBasis::constrained_modes, 4));
@@ -457,6 +478,7 @@ TEST(ReduceOptions, AreChecked) {
       {"modes", "-1", "a whole number expected"},
       {"modes", "1e300", "a whole number expected"},
       {"max-frequency", "inf", "a number expected"},
+      {"max-frequency", "0", "a number above zero expected, got `0`"},
       {"frame", "point:1,2", "three coordinates"},
       {"components", "9", "`label:digits` expected"},
       {"components", "9:78", "component"},
@@ -465,6 +487,28 @@ TEST(ReduceOptions, AreChecked) {
       {"fancy", "1", "unknown option"}};
   for (const auto& [name, value, message] : cases)
     EXPECT_THAT(option_refusal(name, value), HasSubstr(message));
+}
+
+TEST(ReduceOptions, AreGivenOnceAndLaterSourcesCount) {
+  ReductionJob job;
+  read_job("a", "max-frequency = 5\n", job);
+  EXPECT_EQ(job.options.max_frequency, 5);
+  read_job("b", "modes = 3\n", job);
+  EXPECT_EQ(job.options.modes, 3);
+  EXPECT_EQ(job.options.max_frequency, 0);
+  const auto job_refusal = [](const char* text) {
+    ReductionJob read;
+    try {
+      read_job("j", text, read);
+    } catch (const ReductionError& e) {
+      return std::string(e.what());
+    }
+    return std::string("accepted");
+  };
+  EXPECT_EQ(job_refusal("modes = 3\n\nmodes = 4\n"), "j:3: `modes` is given twice");
+  EXPECT_EQ(job_refusal("modes = 3\nmax-frequency = 4\n"),
+            "j:2: both `modes` and `max-frequency` say how many normal modes there are (give one "
+            "of them)");
 }
 
 TEST(ReduceRefusals, UnknownProcessor) {
