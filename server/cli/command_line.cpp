@@ -167,7 +167,7 @@ void add_eig(CLI::App& app, mbcosim::cli::EigCommand& command, int& exit_code) {
       ->check(mbcosim::server::NumberCheck::at_least(0));
   eig->add_option("--near", command.shift, "Frequency [Hz] near which they are wanted")
       ->capture_default_str()
-      ->check(mbcosim::server::NumberCheck::finite());
+      ->check(mbcosim::server::NumberCheck::at_least(0));
   eig->add_option("--time", command.time, "Run the deck to this time first")
       ->check(mbcosim::server::NumberCheck::finite());
   eig->callback([&] { exit_code = mbcosim::cli::eig(command); });

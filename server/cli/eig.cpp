@@ -47,8 +47,9 @@ void print(const Eigen::VectorXcd& values, double time, const UnitSystem* units)
   for (const Eigen::Index k : order(values)) {
     const std::complex<double> value = values(k);
     const double size = std::abs(value), percent = size > 0 ? -100 * value.real() / size : 0;
-    std::printf("  %16.8g %16.8g %14.8g %12.4g\n", value.real(), value.imag(),
-                value.imag() / (2 * std::numbers::pi * second),
+    const double imaginary = std::abs(value.imag());
+    std::printf("  %16.8g %16.8g %14.8g %12.4g\n", value.real(), imaginary,
+                imaginary / (2 * std::numbers::pi * second),
                 std::abs(percent) < kNoise ? 0 : percent);
   }
 }

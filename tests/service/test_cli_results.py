@@ -9,6 +9,7 @@ import subprocess
 import numpy as np
 import pytest
 
+import decks
 from conftest import BIN, MODELS
 from test_analysis import OSCILLATOR
 
@@ -228,12 +229,19 @@ def test_eig_at_a_time_that_the_deck_does_not_reach(tmp_path):
     for time in ("-0.01", "10.5"):
         assert told("--time", time) == f"error: the deck runs from 0 to 10: --time {time} is not in between\n"
     assert 'expected a number that is finite, got "nan"' in told("--time", "nan")
-    assert 'expected a number that is finite, got "inf"' in told("--near", "inf")
+    assert 'expected a number of at least 0, got "inf"' in told("--near", "inf")
+    assert 'expected a number of at least 0, got "-5"' in told("--near", "-5")  # no line would be left
     assert mbcosim("eig", "o", "--time", 10, cwd=tmp_path).stdout.startswith("eigenvalues at t = 10 s")
     driver = 'begin: drivers; file: 7, fixed step, 4, 1, initial time, 0., time step, 1., bailout, upper, "samples"; end: drivers;\n'
     (tmp_path / "samples").write_text("0.\n0.\n0.\n0.\n")
     (tmp_path / "o").write_text(OSCILLATOR.replace("end: control data;", "file drivers: 1; end: control data;").replace("begin: elements;", driver + "begin: elements;"))
     assert told("--time", "8") == "error: the deck runs from 0 to 3: --time 8 is not in between\n"
+
+
+def test_eig_shows_no_minus_before_a_zero(tmp_path):
+    (tmp_path / "free").write_text(decks.body(spin="0., 0., 0."))
+    shown = mbcosim("eig", "free", cwd=tmp_path)
+    assert shown.returncode == 0 and len(shown.stdout.splitlines()) > 2 and "-0 " not in shown.stdout
 
 
 def test_eig_tells_units_that_the_deck_declares(tmp_path):
