@@ -105,8 +105,7 @@ double share(const std::string& name, const std::string& value) {
 
 double above_zero(const std::string& name, const std::string& value) {
   const double number = real(name, value);
-  if (!(number > 0))
-    refuse_reduction(name + ": a number above zero expected, got `" + value + "`");
+  if (!(number > 0)) refuse_reduction(name + ": a number above zero expected, got `" + value + "`");
   return number;
 }
 
