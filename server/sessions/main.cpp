@@ -46,10 +46,12 @@ void write_file(const std::string& path, const std::string& bytes) {
   std::ofstream file(making, std::ios::binary);
   file << bytes;
   file.close();
-  if (file) std::filesystem::rename(making, path);
-  if (!file) {
-    std::filesystem::remove(making);
-    throw std::runtime_error("cannot write " + path);
+  std::error_code error;
+  if (file) std::filesystem::rename(making, path, error);
+  if (!file || error) {
+    const std::string why = error ? ": " + error.message() : "";
+    std::filesystem::remove(making, error);
+    throw std::runtime_error("cannot write " + path + why);
   }
 }
 

@@ -9,6 +9,7 @@ import sys
 import grpc
 import pytest
 
+import decks
 import mbcosim
 import mbcosim.aio
 from conftest import BIN, wait_for
@@ -347,6 +348,16 @@ def test_commands_say_what_is_wrong(start, tmp_path):
     for address, why in [(f"unix:{missing}", "there is no such socket"), ("localhost:1", "Connection refused")]:
         code, _, errors = run("sessions", "--address", address, "--timeout", "0.3")
         assert code == 4 and f"no server answers at {address}: " in errors and why in errors, errors
+
+
+def test_a_checkpoint_that_cannot_have_its_name_leaves_nothing(start, tmp_path):
+    daemon = start()
+    folder = tmp_path / "folder"
+    folder.mkdir()
+    with mbcosim.connect(daemon.address) as server:
+        code, _, errors = run("checkpoint", server.load_text(decks.body()).name, "-o", str(folder), "--address", daemon.address)
+    assert code == 4 and f"cannot write {folder}: Is a directory" in errors
+    assert not os.path.exists(f"{folder}.new")
 
 
 def test_names_of_sockets_do_not_stand_in_the_way(start_daemon, tmp_path):
