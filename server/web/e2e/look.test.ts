@@ -35,7 +35,7 @@ beforeAll(() => {
 afterAll(() => rmSync(folder, { recursive: true }));
 
 async function pick(page: Page, name: string): Promise<void> {
-  await page.getByRole('button', { name, exact: true }).click();
+  await page.getByRole('treeitem', { name, exact: true }).click();
   await page.locator('.right .section').first().getByText(name).first().waitFor();
 }
 

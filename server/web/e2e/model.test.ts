@@ -23,7 +23,7 @@ const lines = (text: string | null) => text?.split('\n').map((line) => line.trim
 describe('what is picked', () => {
   test('in the tree shows its card as it is written, with file and line, the parameters that it names, and its variables', async () => {
     await withPage(browser, 'heavy_top.mbd', async ({ page }) => {
-      await page.getByRole('button', { name: 'body 1', exact: true }).click();
+      await page.getByRole('treeitem', { name: 'body 1', exact: true }).click();
       const written = page.locator('.written'), card = cardIn('heavy_top.mbd', 'body:');
       await written.getByText(card.place, { exact: true }).waitFor();
       expect(lines(await written.locator('pre').textContent())).toEqual(lines(card.text));
@@ -36,7 +36,7 @@ describe('what is picked', () => {
 
   test('in an included file names that file', async () => {
     await withPage(browser, 'cantilever_dead_load.mbd', async ({ page }) => {
-      await page.getByRole('button', { name: 'clamp 1', exact: true }).click();
+      await page.getByRole('treeitem', { name: 'clamp 1', exact: true }).click();
       await page.locator('.written').getByText(/^cantilever\.inc:\d+:\d+$/).waitFor();
       expect(await page.locator('.written pre').textContent()).toMatch(/^joint: .*clamp[\s\S]*;$/);
     });
@@ -61,7 +61,7 @@ describe('what is picked', () => {
       await (await download).saveAs(file);
       const again = await visit(browser, `file://${file}`);
       await shown(again.page);
-      await again.page.getByRole('button', { name: 'body 1', exact: true }).click();
+      await again.page.getByRole('treeitem', { name: 'body 1', exact: true }).click();
       expect(lines(await again.page.locator('.written pre').textContent())).toEqual(lines(cardIn('heavy_top.mbd', 'body:').text));
       expect(again.faults).toEqual([]);
       await again.close();

@@ -84,7 +84,7 @@ describe('each example deck', () => {
     });
     await turnTo(page, (await load(deck)).simulation.name);
     await page.locator('.title').getByText(odd).waitFor();
-    await page.getByRole('button', { name: `body 1 · ${odd}`, exact: true }).click();
+    await page.getByRole('treeitem', { name: `body 1 · ${odd}`, exact: true }).click();
     await page.locator('.written figcaption').getByText(`${odd}.mbd`).waitFor();
     await askForDeck(page);
     await page.getByLabel('Files of a deck').setInputFiles({ name: `${odd}.mbd`, mimeType: 'text/plain', buffer: Buffer.from(deck.replace('spherical pin', odd)) });
@@ -1049,7 +1049,7 @@ describe('a daemon that keeps its simulations', () => {
       await page.getByRole('button', { name: 'One step (S)' }).click();
       await atStep(page, 11);
       expect((await scene(page)).nodes).not.toEqual(before.nodes);
-      await page.getByRole('button', { name: 'clamp 1', exact: true }).click();
+      await page.getByRole('treeitem', { name: 'clamp 1', exact: true }).click();
       await page.locator('.written').getByText(/^pendulum\.mbd:\d+:\d+$/).waitFor();
     }, { options, creation: { checkpointSteps: '1' } });
   }
@@ -1141,9 +1141,9 @@ describe('for everybody', () => {
   /** Opens what is closed, with a plot and something selected. */
   async function openAll({ page }: Visit): Promise<void> {
     await page.getByRole('tab', { name: 'Model', exact: true }).first().click();
-    await page.getByRole('button', { name: /^Variables of dynamic node/ }).first().click();
+    await page.getByRole('treeitem', { name: /^dynamic node/ }).first().locator('.twist').first().click();
     await page.getByRole('button', { name: /^Plot node\.structural\.\d+\.X$/ }).first().click();
-    await page.getByRole('button', { name: /^body \d+$/ }).first().click();
+    await page.getByRole('treeitem', { name: /^body \d+$/ }).first().click();
     await page.evaluate(() => document.querySelectorAll('details').forEach((details) => (details.open = true)));
     await page.getByRole('button', { name: 'Compute' }).click();
     await page.getByRole('button', { name: /Hz damping/ }).first().waitFor();
@@ -1167,7 +1167,7 @@ describe('for everybody', () => {
         expect(await seriousFaults(visited)).toEqual([]);
         await button(visited.page, '+10').click();
         await atStep(visited.page, 10);
-        await visited.page.getByRole('button', { name: 'dynamic node 101', exact: true }).click();
+        await visited.page.getByRole('treeitem', { name: 'dynamic node 101', exact: true }).locator('.name').first().click();
         await until(visited.page, () => document.querySelector('.numbers.matrix')?.textContent?.includes('e−') === true, undefined);
         expect(await visited.page.evaluate(() => document.querySelector('.right')?.scrollWidth)).toBe(await visited.page.evaluate(() => document.querySelector('.right')?.clientWidth));
       }
@@ -1194,20 +1194,52 @@ describe('for everybody', () => {
     });
   });
 
+  test('the tree is one stop of the Tab key, and arrows walk it', async () => {
+    await withPage(browser, 'pendulum.mbd', async ({ page }) => {
+      const focused = () => page.evaluate(() => document.activeElement?.getAttribute('aria-label'));
+      const after = async (...keys: string[]) => {
+        for (const key of keys) await page.keyboard.press(key);
+        return focused();
+      };
+      expect(await page.getByRole('treeitem').evaluateAll((items) => items.filter((item) => (item as HTMLElement).tabIndex === 0).length)).toBe(1);
+      expect(await page.locator('.tree :is(button, a, input)').evaluateAll((inside) => inside.filter((one) => (one as HTMLElement).tabIndex === 0).length)).toBe(0);
+      expect(await after('/', 'ArrowDown')).toBe('structural nodes (2)');
+      expect(await after('ArrowRight')).toBe('static node 1');
+      expect(await after('ArrowRight', 'ArrowRight')).toBe('X [3] length: plot');
+      await page.keyboard.press('Enter');
+      await page.locator('.plot canvas').waitFor();
+      expect(await after('ArrowLeft')).toBe('static node 1');
+      expect(await after('ArrowLeft', 'ArrowDown')).toBe('dynamic node 2');
+      expect(await after('ArrowLeft')).toBe('structural nodes (2)');
+      expect(await after('ArrowLeft', 'ArrowDown')).toBe('joint (2)');
+      expect(await after('Home', 'ArrowRight', 'ArrowRight')).toBe('static node 1');
+      expect(await after('ArrowRight', 'ArrowDown')).toBe('X [3] length: plot');
+      await page.getByRole('treeitem', { name: 'structural nodes' }).locator('.twist').first().click();  // what had the focus goes
+      expect(await focused()).toBe('structural nodes (2)');
+      expect(await after('End')).toMatch(/: plot$/);
+      expect(await after('ArrowDown')).toBe(await after('End'));
+      expect(await page.evaluate(() => document.querySelector('.chip')?.textContent)).toBe('ready');
+      await page.keyboard.press('Tab');
+      expect(await page.locator('.tree :focus').count()).toBe(0);
+      await page.keyboard.press('Shift+Tab');
+      expect(await page.locator('.tree :focus').count()).toBe(1);
+    });
+  });
+
   test('the keyboard alone is enough', async () => {
     await withPage(browser, 'pendulum.mbd', async ({ page }) => {
       await page.keyboard.press('/');
       await page.keyboard.type('body');
       await page.keyboard.press('Tab');
-      await page.keyboard.press('Tab');
+      const focused = () => page.evaluate(() => document.activeElement?.getAttribute('aria-label') ?? document.activeElement?.textContent);
+      expect(await focused()).toBe('body (1)');
+      await page.keyboard.press('ArrowDown');
       await page.keyboard.press('Enter');
       await page.locator('.right .section').first().getByText('body 2').waitFor();
-      const focused = () => page.evaluate(() => document.activeElement?.getAttribute('aria-label') ?? document.activeElement?.textContent);
       expect(await focused()).toBe('body 2');
-      await page.keyboard.press('Shift+Tab');
-      for (const plots of [3, 0]) {
-        await page.keyboard.press('Enter');
-        expect(await focused()).toBe('Variables of body 2');
+      for (const [key, plots] of [['ArrowRight', 3], ['ArrowLeft', 0]] as const) {
+        await page.keyboard.press(key);
+        expect(await focused()).toBe('body 2');
         expect(await page.locator('.tree').getByRole('button', { name: /^Plot body/ }).count()).toBe(plots);
       }
       await button(page, 'Save state').press('Enter');

@@ -18,7 +18,7 @@ import { diagnosticsList } from './panels/diagnostics';
 import { Session, type Shown } from './session';
 
 const KEYS: [string, string][] = [
-  ['Space', 'run and pause'], ['S', 'one step'], ['← →', 'one recorded sample back, on (turn the scene while it has the focus)'],
+  ['Space', 'run and pause'], ['S', 'one step'], ['← →', 'one recorded sample back, on (turn the scene, walk the tree while they have the focus)'],
   ['L', 'back to live'], ['B', 'save the state'], ['/', 'search'], ['F', 'follow the selected node'], ['T', 'trail of the selected node'],
   ['Z', 'look at what is selected'], ['H', 'whole model'], ['1 2 3', 'views along the axes'], ['O', 'parallel projection'], ['D', 'dark and light'], ['?', 'these keys'],
 ];
