@@ -1,6 +1,6 @@
 import { describe, expect, test } from 'vitest';
 import type { Curve } from '../src/desk';
-import { alone, columns } from '../src/panels/plots';
+import { alone, columns, traces } from '../src/panels/plots';
 import { Layout, type Sample } from '../src/recording';
 
 const variable = (handle: number) => ({ handle, size: 1, name: `v${handle}` }) as Curve['variable'];
@@ -16,8 +16,8 @@ describe('a curve', () => {
   });
 
   test('over another one goes to and fro in the order of time, where both are known', () => {
-    expect(columns(samples, { id: 1, curves: [first], against: second })).toEqual([[20, 40], [-1, 1]]);
-    expect(columns(samples, { id: 1, curves: [second], against: first })).toEqual([[1, 0, -1, 0, 1], [null, null, 20, null, 40]]);
+    expect(traces(samples, [first], second)).toEqual([[[20, null, 40], [-1, null, 1]]]);
+    expect(traces(samples, [first, second], first)).toEqual([[[1, 0, -1], [1, 0, -1]], [[-1, null, 1], [20, null, 40]]]);
   });
 
   test('of very many samples has fewer points, and the newest', () => {

@@ -5,9 +5,7 @@ import { h, iconButton, replace } from '../dom';
 import { curveName, ticks, unitOf } from '../format';
 import { shortName } from '../model';
 import { valueOf, type Layout, type Sample } from '../recording';
-
-/** A point of a curve; null: the sample does not have it. One NaN, and uPlot finds no range for the whole curve. */
-type Value = number | null;
+import { trace, type Value } from '../trace';
 
 const COLOURS = {
   dark: ['#4aa8ff', '#f0a13c', '#35c2a8', '#ff7676', '#b980ff', '#c9b458', '#d86f9a', '#8fd3ff', '#e3eaf1'],
@@ -20,29 +18,21 @@ const HEIGHT = 150;
 /** Times between which a plot shows its curves. */
 type Range = readonly [from: number, to: number];
 
-/** Columns for a plot: abscissa, then one for each curve. Of very many samples those are left out between which no curve has an end or a peak. */
-export function columns(samples: readonly Sample[], plot: Plot, range: Range = [-Infinity, Infinity]): Value[][] {
-  const result: Value[][] = [[], ...plot.curves.map(() => [])];
-  const at = (sample: Sample, { variable, element }: Curve): Value => {
-    const value = valueOf(sample, variable.handle, element);
-    return Number.isFinite(value) ? value : null;
-  };
-  for (const sample of plot.against ? evenly(samples) : withPeaks(samples, plot.curves, range)) {
-    const abscissa = plot.against ? at(sample, plot.against) : sample.time;
-    if (abscissa === null) continue;
-    result[0].push(abscissa);
-    plot.curves.forEach((curve, k) => result[k + 1].push(at(sample, curve)));
-  }
-  return result;
+/** Columns for a plot over time: that, then one for each curve. Of very many samples those are left out between which no curve has an end or a peak. */
+export function columns(samples: readonly Sample[], { curves }: Plot, range: Range = [-Infinity, Infinity]): Value[][] {
+  const shown = withPeaks(samples, curves, range);
+  const finite = (value: number): Value => (Number.isFinite(value) ? value : null);
+  return [shown.map(({ time }) => time), ...curves.map(({ variable, element }) => shown.map((sample) => finite(valueOf(sample, variable.handle, element))))];
 }
 
-/** At most about so many samples as a screen has points, the newest among them. */
-function evenly(samples: readonly Sample[]): readonly Sample[] {
-  const stride = Math.max(1, Math.ceil(samples.length / POINTS));
-  return samples.filter((_, i) => i % stride === 0 || i === samples.length - 1);
+/** Points of each curve over another one. */
+export function traces(samples: readonly Sample[], curves: readonly Curve[], against: Curve): [Value[], Value[]][] {
+  const numbers = ({ variable, element }: Curve) => Float64Array.from(samples, (sample) => valueOf(sample, variable.handle, element));
+  const abscissa = numbers(against);
+  return curves.map((curve) => trace(abscissa, numbers(curve)));
 }
 
-/** The same of those between two times and one to each side; of each piece those where a curve is least and greatest. */
+/** At most about so many samples as a screen has points, of those between two times and one to each side: of each piece those where a curve is least and greatest. */
 function withPeaks(samples: readonly Sample[], curves: readonly Curve[], [from, to]: Range): readonly Sample[] {
   const begin = Math.max(firstAfter(samples, from) - 1, 0), end = Math.min(firstAfter(samples, to) + 1, samples.length);
   const length = Math.ceil(((end - begin) * (2 * curves.length + 1)) / POINTS);
@@ -173,8 +163,8 @@ class PlotView {
 
   /** As uPlot wants it: a table, or points for each curve where the abscissa goes to and fro. */
   private data(samples: readonly Sample[]): uPlot.AlignedData {
-    const [x, ...curves] = columns(samples, this.plot, this.zoomed);
-    return (this.plot.against ? [null, ...curves.map((y) => [x, y])] : [x, ...curves]) as uPlot.AlignedData;
+    const { curves, against } = this.plot;
+    return (against ? [null, ...traces(samples, curves, against)] : columns(samples, this.plot, this.zoomed)) as uPlot.AlignedData;
   }
 
   private chip(curve: Curve, colour: string): HTMLElement {
