@@ -26,10 +26,16 @@ function digitsOf(largest: number, increment: number, least: number): number {
   return Number.isFinite(digits) ? Math.min(Math.max(digits, least), 16) : least;
 }
 
-/** Numbers beside an axis. */
-export function ticks(values: readonly number[], increment: number): string[] {
+/** Numbers beside an axis, on which `10 ** power` is one. */
+export function ticks(values: readonly number[], increment: number, power = 0): string[] {
   const digits = digitsOf(Math.max(...values.map(Math.abs)), increment, 4);
-  return values.map((value) => number(value, digits));
+  return values.map((value) => (power === 0 ? number(value, digits) : withPower(value, digits, power)));
+}
+
+/** `value` times a power of ten that it may not have room for. */
+function withPower(value: number, digits: number, power: number): string {
+  const [mantissa, exponent] = value.toExponential(digits - 1).split('e');
+  return value === 0 ? '0' : `${number(Number(mantissa), digits)}e${Number(exponent) + power < 0 ? '−' : '+'}${Math.abs(Number(exponent) + power)}`;
 }
 
 /** A time; those of steps, `step` apart, differ. */

@@ -71,6 +71,8 @@ describe('numbers', () => {
     expect(ticks([0, 0.2, 0.4], 0.2)).toEqual(['0', '0.2', '0.4']);
     expect(ticks([0, 2e-300], 2e-300)).toEqual(['0', '2e−300']);
     expect(ticks([0, 5e9], 5e9)).toEqual(['0', '5e+9']);
+    expect(ticks([-2, 0, 0.5, 20], 0.5, 308)).toEqual(['−2e+308', '0', '5e+307', '2e+309']);
+    expect(ticks([9.5, 10, 10.5], 0.5, -18)).toEqual(['9.5e−18', '1e−17', '1.05e−17']);
   });
 
   test('of time differ from step to step', () => {

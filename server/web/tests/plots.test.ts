@@ -1,6 +1,6 @@
 import { describe, expect, test } from 'vitest';
 import type { Curve } from '../src/desk';
-import { alone, columns, traces } from '../src/panels/plots';
+import { alone, columns, powerOf, traces, without } from '../src/panels/plots';
 import { Layout, type Sample } from '../src/recording';
 
 const variable = (handle: number) => ({ handle, size: 1, name: `v${handle}` }) as Curve['variable'];
@@ -48,5 +48,10 @@ describe('a curve', () => {
   test('has dots where no line joins its points', () => {
     const data: [number[], ...(number | null)[][]] = [[0, 1, 2, 3, 4], [7, null, 3, 4, null], [null, null, null, null, 1], [1, 2, 3, 4, 5]];
     expect([1, 2, 3].map((series) => alone({ data }, series))).toEqual([[0], [4], null]);
+  });
+
+  test('of very large or very small numbers has an axis that counts in a power of ten', () => {
+    expect([[1, -5e15], [0, null], [1e15], [-3e-13, 1e-14], [1.7e308], [5e-324]].map((values) => powerOf([values]))).toEqual([15, 0, 0, -13, 308, -324]);
+    expect([without(308, 1.7e308), without(-324, 5e-324), without(-13, -3e-13), without(0, 7)]).toEqual([1.7, 4.94, -3, 7].map((value) => expect.closeTo(value, 2)));
   });
 });

@@ -71,6 +71,23 @@ function firstAfter(samples: readonly Sample[], time: number): number {
   return low;
 }
 
+/** Power of ten by which an axis counts; 0: numbers as they are, of which uPlot knows neither very large nor very small ones. */
+export function powerOf(curves: readonly (readonly Value[])[]): number {
+  let largest = 0;
+  for (const values of curves) for (const value of values) if (value !== null) largest = Math.max(largest, Math.abs(value));
+  return largest > 1e15 || (largest > 0 && largest < 1e-12) ? Math.floor(Math.log10(largest)) : 0;
+}
+
+/** Without a power of ten, which may itself be no number. */
+export function without(power: number, value: number): number {
+  const half = Math.trunc(power / 2);
+  return value * 10 ** -half * 10 ** (half - power);
+}
+
+function scaleDown(power: number, values: Value[]): Value[] {
+  return power === 0 ? values : values.map((value) => value && without(power, value));
+}
+
 function label(curve: Curve): string {
   const { variable, element } = curve;
   const part = variable.name.slice(0, variable.name.length - shortName(variable.name).length).replace(/\.$/, '');
@@ -107,6 +124,8 @@ class PlotView {
   private chart?: uPlot;
   /** Part of the time that is looked at from near by. */
   private zoomed?: Range;
+  /** Of ten, by which the axes count. */
+  private powers = { x: 0, y: 0 };
   private readonly whole = iconButton('fit', 'All of the time', () => this.zoom(undefined), { class: 'icon-button small hidden' });
   private readonly header = h('header');
   private readonly canvas = h('div', { class: 'canvas' });
@@ -146,8 +165,8 @@ class PlotView {
         height: HEIGHT,
         scales: { x: { time: false } },
         axes: [
-          { ...axis, size: 26, values: texts, space: (_, __, low, high) => Math.max(50, 20 + widthOf(ticks([low, high], (high - low) / 10))) },
-          { ...axis, size: (_, labels) => Math.max(56, 20 + widthOf(labels ?? [])), values: texts },
+          { ...axis, size: 26, values: this.texts('x'), space: (_, __, low, high) => Math.max(50, 20 + widthOf(ticks([low, high], (high - low) / 10, this.powers.x))) },
+          { ...axis, size: (_, labels) => Math.max(56, 20 + widthOf(labels ?? [])), values: this.texts('y') },
         ],
         hooks: { draw: [(chart) => this.drawCursor(chart)], setSelect: [(chart) => this.zoomTo(chart)] },
         ...(this.plot.against
@@ -161,10 +180,20 @@ class PlotView {
     this.update();
   }
 
+  private texts(axis: 'x' | 'y'): uPlot.Axis.DynamicValues {
+    return (_, values, __, ___, increment) => ticks(values, increment, this.powers[axis]);
+  }
+
   /** As uPlot wants it: a table, or points for each curve where the abscissa goes to and fro. */
   private data(samples: readonly Sample[]): uPlot.AlignedData {
     const { curves, against } = this.plot;
-    return (against ? [null, ...traces(samples, curves, against)] : columns(samples, this.plot, this.zoomed)) as uPlot.AlignedData;
+    if (against) {
+      const found = traces(samples, curves, against), x = (this.powers.x = powerOf(found.map(([x]) => x))), y = (this.powers.y = powerOf(found.map(([, y]) => y)));
+      return [null, ...found.map(([xs, ys]) => [scaleDown(x, xs), scaleDown(y, ys)])] as unknown as uPlot.AlignedData;
+    }
+    const [time, ...values] = columns(samples, this.plot, this.zoomed);
+    this.powers = { x: 0, y: powerOf(values) };
+    return [time, ...values.map((column) => scaleDown(this.powers.y, column))] as uPlot.AlignedData;
   }
 
   private chip(curve: Curve, colour: string): HTMLElement {
@@ -226,7 +255,7 @@ class PlotView {
       const y = valueOf(sample, variable.handle, element);
       if (!Number.isFinite(x) || !Number.isFinite(y)) continue;
       chart.ctx.beginPath();
-      chart.ctx.arc(chart.valToPos(x, 'x', true), chart.valToPos(y, 'y', true), 3.5 * devicePixelRatio, 0, 2 * Math.PI);
+      chart.ctx.arc(chart.valToPos(without(this.powers.x, x), 'x', true), chart.valToPos(without(this.powers.y, y), 'y', true), 3.5 * devicePixelRatio, 0, 2 * Math.PI);
       chart.ctx.fill();
     }
     chart.ctx.restore();
@@ -246,8 +275,6 @@ class PlotView {
     this.chart?.destroy();
   }
 }
-
-const texts: uPlot.Axis.DynamicValues = (_, values, __, ___, increment) => ticks(values, increment);
 
 /** Of the widest of some texts at an axis, about. */
 function widthOf(labels: readonly string[]): number {
