@@ -1,4 +1,5 @@
 /** What the parts of the page share: the simulation on show, the time looked at, what is selected, what is plotted. */
+import { oncePerFrame } from './dom';
 import type { Sample } from './recording';
 import { Session, type Shown } from './session';
 import { Signal } from './signal';
@@ -32,7 +33,7 @@ export class Desk {
   readonly calm = new Signal(0);
   private calmed = true;
   private calmMilliseconds = CALM_MILLISECONDS;
-  private stale = false;
+  private readonly askForFrame = oncePerFrame(() => (this.frame.value += 1));
   private unwatch = () => {};
   private nextPlot = 1;
 
@@ -63,13 +64,7 @@ export class Desk {
   }
 
   invalidate(): void {
-    if (this.stale) return;
-    this.stale = true;
-    requestAnimationFrame(() => {
-      this.stale = false;
-      this.frame.value += 1;
-    });
-    this.invalidateCalm();
+    if (this.askForFrame()) this.invalidateCalm();
   }
 
   private invalidateCalm(): void {

@@ -51,6 +51,20 @@ export function arrange(parent: HTMLElement, children: readonly Element[]): void
   parent.focus();
 }
 
+/** Asks for `work` with the next frame of the screen, however often it is called until then; true: it was not asked for yet. */
+export function oncePerFrame(work: () => void): () => boolean {
+  let asked = false;
+  return () => {
+    if (asked) return false;
+    asked = true;
+    requestAnimationFrame(() => {
+      asked = false;
+      work();
+    });
+    return true;
+  };
+}
+
 /** Paths of a 24 × 24 drawing, stroked in the text's colour. */
 const ICONS: Record<string, string> = {
   play: 'M7 5l12 7-12 7z',

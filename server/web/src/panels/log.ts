@@ -1,6 +1,6 @@
 /** What happened, newest last. */
 import type { Desk } from '../desk';
-import { h } from '../dom';
+import { h, oncePerFrame } from '../dom';
 import type { LogEntry } from '../session';
 import { section } from './section';
 
@@ -8,11 +8,10 @@ export function logPanel(desk: Desk): HTMLElement {
   const list = h('div', { class: 'log', role: 'log', 'aria-live': 'polite', tabindex: 0, 'aria-label': 'Events' });
   const panel = section('Events', false, list);
   const rows = new Map<LogEntry, HTMLElement>();
-  let unwatch = () => {}, stale = false;
+  let unwatch = () => {};
 
   /** What stays is not touched: it may be selected, and is read aloud once. */
   const draw = () => {
-    stale = false;
     const atEnd = list.scrollHeight - list.scrollTop - list.clientHeight < 4;  // otherwise somebody reads what was before
     const entries = new Set(desk.session?.log.value);
     for (const [entry, row] of rows) {
@@ -29,13 +28,11 @@ export function logPanel(desk: Desk): HTMLElement {
     if (atEnd) list.scrollTop = list.scrollHeight;
   };
 
+  const drawSoon = oncePerFrame(draw);  // many may come at once
   desk.shown.watch(() => {
     unwatch();
     panel.classList.toggle('hidden', !desk.session);
-    unwatch = desk.session?.log.watch(() => {
-      if (!stale) requestAnimationFrame(draw);  // many may come at once
-      stale = true;
-    }) ?? (() => {});
+    unwatch = desk.session?.log.watch(drawSoon) ?? (() => {});
   });
   return panel;
 }

@@ -1,7 +1,7 @@
 /** What the solver did: iterations, residuals, where the time went. */
 import uPlot from 'uplot';
 import type { Desk } from '../desk';
-import { h } from '../dom';
+import { h, oncePerFrame } from '../dom';
 import { number, seconds, ticks } from '../format';
 import type { StepRecord } from '../session';
 import { section } from './section';
@@ -30,7 +30,8 @@ export function solverPanel(desk: Desk): HTMLElement {
   let chart: uPlot | undefined;
   let unwatch = () => {};
 
-  const draw = (steps: readonly StepRecord[]) => {
+  const draw = () => {
+    const steps: readonly StepRecord[] = desk.session?.steps.value ?? [];
     const last = steps[steps.length - 1], recent = steps.slice(-50);
     const count = recent.reduce((sum, step) => sum + step.steps, 0), solver = recent.reduce((sum, step) => sum + step.solver, 0);
     const rows: [string, string][] = last
@@ -60,14 +61,15 @@ export function solverPanel(desk: Desk): HTMLElement {
       [[], [], []],
       canvas,
     );
-    draw(desk.session?.steps.value ?? []);
+    draw();
   };
 
+  const drawSoon = oncePerFrame(draw);
   desk.theme.watch(rebuild);
   desk.shown.watch(() => {
     unwatch();
     panel.classList.toggle('hidden', !desk.session);
-    unwatch = desk.session?.steps.watch(draw) ?? (() => {});
+    unwatch = desk.session?.steps.watch(drawSoon) ?? (() => {});
   });
   new ResizeObserver(() => chart?.setSize({ width: Math.max(canvas.clientWidth, 200), height: 130 })).observe(canvas);
   return panel;
