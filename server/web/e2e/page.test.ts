@@ -876,7 +876,15 @@ describe('a deck from the disk', () => {
       expect(await page.locator('.diagnostic mark').textContent()).toBe('sperical hinge');
       const lines = text.split('\n'), at = lines.findIndex((line) => line.includes('joint: 2, sperical hinge'));
       expect(await page.locator('.diagnostic .line code').allTextContents()).toEqual(lines.slice(at - 3, at + 4));
-      await page.getByText('did you mean "spherical hinge"?').waitFor();
+      const hint = page.getByText('did you mean "spherical hinge"?');
+      await hint.waitFor();
+      const lists = '**/mbcosim.v1.Simulations/ListSimulations', lost = page.getByRole('main').getByText('the daemon does not answer', { exact: true });
+      await page.route(lists, (route) => route.abort('connectionreset'));
+      await lost.waitFor();
+      expect(await hint.isVisible()).toBe(true);
+      await page.unroute(lists);
+      await lost.waitFor({ state: 'detached' });
+      expect(await hint.isVisible()).toBe(true);
       visited.faults.length = 0;  // the browser reports the refusal, too
     });
   });

@@ -28,8 +28,8 @@ interface Row {
   remove: HTMLElement;
 }
 
-/** What the message is about. A connection that is lost is told in place of a failure, and no longer than it is lost. */
-type About = 'nothing' | 'deck' | 'failure' | 'connection';
+/** What the message is about. */
+type About = 'nothing' | 'deck' | 'failure';
 
 export class Home {
   /** The list for the left-hand side. */
@@ -37,6 +37,8 @@ export class Home {
   /** What stands in place of the scene while nothing is shown. */
   readonly welcome = h('div', { class: 'empty' });
   private readonly message = h('div', { 'aria-live': 'polite' });
+  /** Why the daemon cannot be asked: told beside what is said of a deck, in place of a failure, and no longer than it is so. */
+  private readonly connection = h('div', { 'aria-live': 'polite' });
   private readonly back = h('button', { type: 'button', class: 'button', onclick: () => this.welcome.classList.add('hidden') }, 'Back to the simulation');
   private about: About = 'nothing';
   private readonly none = h('li', { class: 'soft' }, 'No simulation yet.');
@@ -48,7 +50,7 @@ export class Home {
       h('h1', {}, 'See it move'),
       h('p', { class: 'soft' }, 'Choose a simulation of this daemon, or bring a deck of your own.'),
       h('div', { class: 'drop' }, icon('upload'), h('p', {}, 'Drop a deck here, with the files that it includes, or its folder.'), this.chooser()),
-      this.back, this.message));
+      this.back, this.connection, this.message));
     this.acceptDrops();
     desk.shown.watch((shown) => {
       this.welcome.classList.toggle('hidden', shown !== undefined);
@@ -128,12 +130,19 @@ export class Home {
   async refresh(): Promise<SimulationInfo[]> {
     try {
       this.known = await listSimulations();
-      if (this.about === 'connection') this.say('nothing');
+      this.connection.replaceChildren();
       this.draw();
     } catch (thrown) {
-      if (this.about !== 'deck') this.tell(failureOf(thrown), [], 'connection');
+      this.tellLost(failureOf(thrown));
     }
     return this.known;
+  }
+
+  private tellLost(failure: Failure): void {
+    if (this.about === 'failure') this.say('nothing');
+    if (!this.desk.shown.value) this.welcome.classList.remove('hidden');
+    const said = told(failure);
+    if (!this.connection.firstChild?.isEqualNode(said)) this.connection.replaceChildren(said);  // is read aloud once
   }
 
   private say(about: About, ...words: Node[]): void {
@@ -141,14 +150,10 @@ export class Home {
     this.message.replaceChildren(...words);
   }
 
-  tell(failure: Failure, files: readonly NamedFile[] = [], about: About = failure.diagnostics.length > 0 ? 'deck' : 'failure'): void {
-    const hint = remedy(failure);
-    if (about !== 'connection' || !this.desk.shown.value) this.welcome.classList.remove('hidden');
-    const said = h('div', {},
-      failure.diagnostics.length === 0 ? h('div', { class: 'diagnostic' }, h('strong', {}, failure.message), hint && h('p', {}, hint)) : '',
-      diagnosticsList(failure.diagnostics, files));
-    this.about = about;
-    if (about !== 'connection' || said.innerHTML !== this.message.innerHTML) this.message.replaceChildren(...said.childNodes);  // is read aloud once
+  tell(failure: Failure, files: readonly NamedFile[] = []): void {
+    this.welcome.classList.remove('hidden');
+    if (failure.diagnostics.length > 0) this.say('deck', diagnosticsList(failure.diagnostics, files));
+    else this.say('failure', told(failure));
   }
 
   private draw(): void {
@@ -200,3 +205,8 @@ export class Home {
   }
 }
 
+/** A failure, and what to do about it. */
+function told(failure: Failure): HTMLElement {
+  const hint = remedy(failure);
+  return h('div', { class: 'diagnostic' }, h('strong', {}, failure.message), hint && h('p', {}, hint));
+}
