@@ -140,18 +140,19 @@ export function otherParts(model: Model): Part[] {
   });
 }
 
+/** The label in the name of a variable, with its dots. */
+const LABEL = /\.(-?\d+)(?:\.|$)/;
+
 /** "joint:7" of "joint.7.Fx", "node.structural:2" of "node.structural.2.X"; empty: of the model. */
 export function partOf(variable: string): string {
-  const words = variable.split('.');
-  const label = words.findIndex((word, i) => i > 0 && /^-?\d+$/.test(word));
-  return label < 0 ? '' : `${words.slice(0, label).join('.')}:${words[label]}`;
+  const label = LABEL.exec(variable);
+  return label ? `${variable.slice(0, label.index)}:${label[1]}` : '';
 }
 
 /** "Fx" of "joint.7.Fx". */
 export function shortName(variable: string): string {
-  const words = variable.split('.');
-  const label = words.findIndex((word, i) => i > 0 && /^-?\d+$/.test(word));
-  return label < 0 ? variable : words.slice(label + 1).join('.');
+  const label = LABEL.exec(variable);
+  return label ? variable.slice(label.index + label[0].length) : variable;
 }
 
 /** Of models that were asked about: a large one has a hundred thousand variables. */
@@ -169,6 +170,10 @@ export function variablesByPart(variables: readonly VariableInfo[]): ReadonlyMap
     else found.set(part, [variable]);
   }
   return found;
+}
+
+export function variableNamed(variables: readonly VariableInfo[], name: string): VariableInfo | undefined {
+  return variablesByPart(variables).get(partOf(name))?.find((variable) => variable.name === name);
 }
 
 /** Title of a part as the tree shows it. */

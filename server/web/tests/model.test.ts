@@ -1,5 +1,5 @@
 import { describe, expect, test } from 'vitest';
-import { evenly, matches, namedIn, otherParts, partOf, shortName, variablesByPart, type Model } from '../src/model';
+import { evenly, matches, namedIn, otherParts, partOf, shortName, variableNamed, variablesByPart, type Model } from '../src/model';
 import { bytes, clock, curveName, editable, number, numberOf, seconds, ticks, unitOf } from '../src/format';
 import { Pace } from '../src/pace';
 import { jointGlyph } from '../src/scene/glyphs';
@@ -13,6 +13,8 @@ describe('names of variables', () => {
     ['joint.10.x[1003,1]', 'joint:10', 'x[1003,1]'],
     ['time', '', 'time'],
     ['drive.-4.value', 'drive:-4', 'value'],
+    ['node.abstract.12', 'node.abstract:12', ''],
+    ['plugin.v2.3a', '', 'plugin.v2.3a'],
   ])('%s belongs to %s', (name, part, short) => {
     expect(partOf(name)).toBe(part);
     expect(shortName(name)).toBe(short);
@@ -44,6 +46,7 @@ test('drives stand in the tree, since variables belong to them', () => {
   const model = { nodes: [], elements: [part], variables: ['time', 'joint.7.Fx', 'drive.4.value'].map(variable) } as unknown as Model;
   expect(otherParts(model)).toEqual([{ id: 'drive:4', family: 'drive', type: 'drive caller', label: 4, name: '' }]);
   expect([...variablesByPart(model.variables).keys()]).toEqual(['', 'joint:7', 'drive:4']);
+  expect(['joint.7.Fx', 'time', 'joint.7.Fy', 'joint.8.Fx'].map((name) => variableNamed(model.variables, name)?.name)).toEqual(['joint.7.Fx', 'time', undefined, undefined]);
   expect(variablesByPart(model.variables)).toBe(variablesByPart(model.variables));  // those of a large model are sorted once
 });
 

@@ -4,6 +4,7 @@ import type { Desk } from '../desk';
 import { h, icon, iconButton } from '../dom';
 import { clock, number, ticks } from '../format';
 import { pointAt, PoseReader, positionOf, type Pose } from '../geometry';
+import { variableNamed } from '../model';
 import { amplitude, MovedPose, type Mode } from '../modes';
 import { ASKED_FOR, type Layer, type Legend } from '../scene/build';
 import { DARK, LIGHT } from '../scene/palette';
@@ -60,8 +61,7 @@ export class ScenePanel {
   }
 
   private show(shown: Shown): void {
-    const handles = new Map(shown.model.variables.map((variable) => [variable.name, variable.handle]));
-    this.view.show(shown.geometry, (name) => handles.get(name));
+    this.view.show(shown.geometry, (name) => variableNamed(shown.model.variables, name)?.handle);
     const present = new Set(this.view.layers());
     for (const [layer, entry] of this.layers) entry.classList.toggle('hidden', !present.has(layer));
     this.deformation.classList.toggle('hidden', !present.has('flexible'));
