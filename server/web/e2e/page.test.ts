@@ -626,6 +626,21 @@ describe('inputs', () => {
       await page.getByText('6 more numbers of stream.force are not shown').waitFor();
       await page.getByRole('slider', { name: 'stream.force.24' }).fill('2.5');
       await becomes(view, 'stream.force', values.map((value) => (value === 23 ? 2.5 : value)));
+      // One of them is plotted, and the reader adds others.
+      await page.getByRole('searchbox', { name: 'Search the model' }).fill('stream.force');
+      await button(page, 'Plot stream.force').click();
+      const another = page.getByRole('combobox', { name: 'Another number of stream.force' });
+      expect(await another.locator('option').first().textContent()).toBe('1 of 30 numbers: add …');
+      await another.focus();
+      await another.selectOption({ label: '24' });
+      expect(await page.locator('.plot .curve').allTextContents()).toEqual(['stream.force.1', 'stream.force.24']);
+      expect(await another.locator('option').count()).toBe(29);
+      expect(await another.evaluate((select) => select === document.activeElement)).toBe(true);
+      await button(page, 'Remove stream.force.24').press('Enter');
+      expect(await page.getByRole('combobox', { name: 'Plot against' }).evaluate((select) => select === document.activeElement)).toBe(true);
+      await button(page, 'Plot stream.force').click();
+      await button(page, 'Close this plot').first().press('Enter');
+      await until(page, () => document.activeElement?.matches('.plots') === true, undefined);
     });
     rmSync(folder, { recursive: true });
   });

@@ -17,6 +17,9 @@ export interface Plot {
   against?: Curve;
 }
 
+/** Numbers of a variable that are plotted at once. Of more the reader chooses. */
+export const MOST_CURVES = 9;
+
 /** A few times a second is so often; what is drawn then has at most such a part of all time. */
 const CALM_MILLISECONDS = 100, CALM_PART = 0.2;
 
@@ -86,16 +89,18 @@ export class Desk {
     this.shown.value = shown;
   }
 
-  /** Adds curves of all numbers of a variable: to the plot `id`, or in a new one. */
-  plot(variable: VariableInfo, id?: number): void {
+  /** A new plot with curves of all numbers of a variable; of many only the first. */
+  plot(variable: VariableInfo): void {
     this.session?.want([variable]);
-    const elements = variable.size <= 9 ? Array.from({ length: variable.size }, (_, k) => k) : [0];
-    const curves = elements.map((element) => ({ variable, element }));
-    const known = this.plots.value.find((plot) => plot.id === id);
-    if (known) known.curves.push(...curves);
-    else this.plots.value.push({ id: this.nextPlot++, curves });
+    const curves = Array.from({ length: variable.size <= MOST_CURVES ? variable.size : 1 }, (_, element) => ({ variable, element }));
+    this.plots.value.push({ id: this.nextPlot++, curves });
     this.plots.notify();
     this.invalidate();
+  }
+
+  addCurve(plot: Plot, curve: Curve): void {
+    plot.curves.push(curve);
+    this.plots.notify();
   }
 
   unplot(plot: Plot, curve?: Curve): void {

@@ -1,9 +1,9 @@
 /** Plots of chosen variables against time, or against each other. */
 import uPlot from 'uplot';
-import type { Curve, Desk, Plot } from '../desk';
-import { h, iconButton, replace } from '../dom';
-import { curveName, ticks, unitOf } from '../format';
-import { shortName } from '../model';
+import { MOST_CURVES, type Curve, type Desk, type Plot } from '../desk';
+import { arrange, h, iconButton, replace } from '../dom';
+import { componentName, curveName, ticks, unitOf } from '../format';
+import { shortName, type VariableInfo } from '../model';
 import { valueOf, type Layout, type Sample } from '../recording';
 import { trace, type Value } from '../trace';
 
@@ -144,13 +144,16 @@ class PlotView {
   rebuild(): void {
     this.chart?.destroy();
     const colours = COLOURS[this.desk.theme.value];
+    const focused = this.header.contains(document.activeElement) ? document.activeElement?.getAttribute('aria-label') : undefined;
     const units = [...new Set(this.plot.curves.map(({ variable, element }) => unitOf(variable, element)))].filter(Boolean).join(', ');
     replace(
       this.header,
       ...this.plot.curves.map((curve, k) => this.chip(curve, colours[k % colours.length])),
       h('span', { class: 'soft' }, units && `[${units}]`),
+      ...[...new Set(this.plot.curves.map(({ variable }) => variable))].filter(({ size }) => size > MOST_CURVES).map((variable) => this.chooser(variable)),
       h('span', { class: 'ends' }, this.whole, this.abscissa(), iconButton('close', 'Close this plot', () => this.desk.unplot(this.plot), { class: 'icon-button small' })),
     );
+    if (focused) (this.header.querySelector<HTMLElement>(`[aria-label="${CSS.escape(focused)}"]`) ?? this.header.querySelector<HTMLElement>('.ends select'))?.focus();
     const style = getComputedStyle(document.documentElement);
     const axis: uPlot.Axis = {
       stroke: style.getPropertyValue('--soft'),
@@ -199,6 +202,15 @@ class PlotView {
   private chip(curve: Curve, colour: string): HTMLElement {
     return h('span', { class: 'curve' }, h('i', { style: `background:${colour}` }), label(curve),
       iconButton('close', `Remove ${label(curve)}`, () => this.desk.unplot(this.plot, curve), { class: 'icon-button small' }));
+  }
+
+  /** Adds numbers of a variable that has many. */
+  private chooser(variable: VariableInfo): HTMLElement {
+    const drawn = new Set(this.plot.curves.filter((curve) => curve.variable === variable).map(({ element }) => element));
+    const select = h('select', { 'aria-label': `Another number of ${variable.name}`, class: 'small' }, h('option', { value: '' }, `${drawn.size} of ${variable.size} numbers: add …`));
+    for (let element = 0; element < variable.size; ++element) if (!drawn.has(element)) select.append(h('option', { value: element }, componentName(variable.size, element)));
+    select.addEventListener('change', () => this.desk.addCurve(this.plot, { variable, element: Number(select.value) }));
+    return select;
   }
 
   private abscissa(): HTMLElement {
@@ -288,7 +300,7 @@ export function plotsPanel(desk: Desk): HTMLElement {
     const before = views;
     views = desk.plots.value.map((plot) => before.find((view) => view.plot === plot) ?? new PlotView(desk, plot));
     before.filter((view) => !views.includes(view)).forEach((view) => view.end());
-    element.replaceChildren(...views.map((view) => view.element));
+    arrange(element, views.map((view) => view.element));
     views.forEach((view) => view.rebuild());
   };
   desk.plots.watch(rebuild);

@@ -6,8 +6,8 @@ import type { ElementShape } from '../geometry';
 import { namedIn, otherParts, partTitle, shortName, variablesByPart, type Card, type Model, type VariableInfo } from '../model';
 import { valueOf } from '../recording';
 
-/** Variables whose values are followed while something is selected. */
-const MOST = 24;
+/** Variables whose values are followed while something is selected, and numbers of each. */
+const MOST = 24, MOST_NUMBERS = 9;
 
 /** What the scene can do about what is selected. */
 export interface Looking {
@@ -25,7 +25,7 @@ export function selectionPanel(desk: Desk, scene: Looking): HTMLElement {
     const model = desk.shown.value?.model, id = desk.selected.value;
     const part = model && [...model.nodes, ...model.elements, ...otherParts(model)].find((other) => other.id === id);
     if (!part || !model) return body.replaceChildren(h('p', { class: 'soft' }, 'Pick something in the scene or in the tree.'));
-    const variables = (variablesByPart(model.variables).get(part.id) ?? []).slice(0, MOST);
+    const all = variablesByPart(model.variables).get(part.id) ?? [], variables = all.slice(0, MOST);
     desk.session?.want(variables);
     const shape = desk.shown.value?.geometry.elements.find((element) => element.id === id);
     const node = part.id.startsWith('node.structural:');
@@ -37,6 +37,7 @@ export function selectionPanel(desk: Desk, scene: Looking): HTMLElement {
       part.card ? cardText(part.card, model) : '',
       shape ? facts(shape, desk) : '',
       h('table', { class: 'values', 'aria-label': 'Variables' }, h('tbody', {}, ...variables.map(row))),
+      all.length > MOST ? h('p', { class: 'soft' }, `${all.length - MOST} more variables: plot them from the tree`) : '',
     );
     update();
   };
@@ -51,10 +52,11 @@ export function selectionPanel(desk: Desk, scene: Looking): HTMLElement {
   const update = () => {
     const sample = desk.sample;
     for (const { variable, cell } of cells) {
-      const parts = Array.from({ length: Math.min(variable.size, 9) }, (_, k) => {
+      const parts = Array.from({ length: Math.min(variable.size, MOST_NUMBERS) }, (_, k) => {
         const name = variable.size === 9 ? '' : componentName(variable.size, k);
         return h('span', { title: name }, number(sample ? valueOf(sample, variable.handle, k) : NaN, 4));
       });
+      if (variable.size > MOST_NUMBERS) parts.push(h('span', { class: 'soft' }, `and ${variable.size - MOST_NUMBERS} more`));
       cell.replaceChildren(h('div', { class: variable.size === 9 ? 'numbers matrix' : 'numbers' }, ...parts));
     }
   };
