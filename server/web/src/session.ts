@@ -473,7 +473,7 @@ export class Session implements Shown {
   }
 
   private keep(reply: StepReply, elapsed: number): void {
-    const steps = this.steps.value.slice(-499);
+    const steps = this.steps.value.slice(-499).filter((before) => before.step < Number(reply.step));  // later ones are undone
     steps.push({
       step: Number(reply.step),
       time: reply.time,

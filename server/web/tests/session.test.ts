@@ -16,9 +16,13 @@ async function* reachTheEnd() {
   yield { content: { case: 'done', value: { outcome: StepOutcome.FINISHED, stepsDone: 0n, step: 7n, time: 1 } } };
 }
 
+/** Steps that are reached, one after the other. */
+const reached: bigint[] = [];
+const takeStep = async () => ({ outcome: StepOutcome.ACCEPTED, stepsDone: 1n, step: reached.shift() ?? 0n, time: 0 });
+
 vi.mock('../src/api', () => ({
   failureOf: () => ({ message: '', reason: '', metadata: {}, diagnostics: [], cancelled: true }),
-  simulations: { run: reachTheEnd, readVariables: async () => ({ step: 0n, time: 0, values: [] }), listSnapshots: async () => ({ snapshots: [] }) },
+  simulations: { run: reachTheEnd, step: () => takeStep(), readVariables: async () => ({ step: 0n, time: 0, values: [] }), listSnapshots: async () => ({ snapshots: [] }) },
   telemetry: { subscribe: stream },
   events: { watchEvents: stream },
 }));
@@ -85,6 +89,15 @@ describe('a simulation on the screen', () => {
       void ask();
       expect(session.failure.value).toBeUndefined();
     }
+    session.close();
+    await vi.waitFor(() => expect(held).toBe(0));
+  });
+
+  test('forgets what the solver did in steps that are undone', async () => {
+    const session = await Session.open('simulations/1');
+    reached.push(10n, 20n, 15n, 16n);
+    for (let asked = 0; asked < 4; ++asked) await session.step(1);
+    expect(session.steps.value.map(({ step }) => step)).toEqual([10, 15, 16]);
     session.close();
     await vi.waitFor(() => expect(held).toBe(0));
   });

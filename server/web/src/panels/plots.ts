@@ -166,9 +166,10 @@ class PlotView {
       {
         width: this.width(),
         height: HEIGHT,
+        padding: [null, ({ scales: { x } }) => Math.max(20, this.widthAtEnds(x.min ?? 0, x.max ?? 0) / 2), null, null],
         scales: { x: { time: false } },
         axes: [
-          { ...axis, size: 26, values: this.texts('x'), space: (_, __, low, high) => Math.max(50, 20 + widthOf(ticks([low, high], (high - low) / 10, this.powers.x))) },
+          { ...axis, size: 26, values: this.texts('x'), space: (_, __, low, high) => Math.max(50, 20 + this.widthAtEnds(low, high)) },
           { ...axis, size: (_, labels) => Math.max(56, 20 + widthOf(labels ?? [])), values: this.texts('y') },
         ],
         hooks: { draw: [(chart) => this.drawCursor(chart)], setSelect: [(chart) => this.zoomTo(chart)] },
@@ -185,6 +186,11 @@ class PlotView {
 
   private texts(axis: 'x' | 'y'): uPlot.Axis.DynamicValues {
     return (_, values, __, ___, increment) => ticks(values, increment, this.powers[axis]);
+  }
+
+  /** Of the texts at the ends of the abscissa. */
+  private widthAtEnds(low: number, high: number): number {
+    return widthOf(ticks([low, high], (high - low) / 10, this.powers.x));
   }
 
   /** As uPlot wants it: a table, or points for each curve where the abscissa goes to and fro. */
