@@ -864,7 +864,7 @@ describe('a deck from the disk', () => {
         await page.unroute(lists);
       };
       await lose();
-      await page.getByLabel('Files of a deck').setInputFiles(['cantilever_dead_load.mbd', 'cantilever.inc', 'pendulum.mbd'].map((name) => `${MODELS}/${name}`));
+      await page.getByLabel('Files of a deck').setInputFiles(['pendulum.mbd', 'cantilever_dead_load.mbd', 'cantilever.inc'].map((name) => `${MODELS}/${name}`));
       const question = page.getByText('Which of them is the main file?');
       await question.waitFor();
       await listed();
@@ -872,6 +872,7 @@ describe('a deck from the disk', () => {
       await listed();
       await listed();
       expect(await question.isVisible()).toBe(true);
+      expect(await page.locator('.empty [aria-live] button').allTextContents()).toEqual(['cantilever_dead_load.mbd', 'pendulum.mbd']);
       expect(faults.splice(0).join()).toContain('ERR_CONNECTION_RESET');
       await page.getByRole('main').getByRole('button', { name: 'cantilever_dead_load.mbd' }).click();
       await until(page, (name) => location.hash.includes('simulation=') && !location.hash.includes(encodeURIComponent(name)), view.simulation);

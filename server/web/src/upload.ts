@@ -16,7 +16,10 @@ export function chunks(files: readonly NamedFile[]): NamedFile[] {
   });
 }
 
-/** Files that can be a deck's main file: they have a `begin: data;` card, or include a file that leads to one, and none of the others includes them. */
+/**
+ * Files that can be a deck's main file: they have a `begin: data;` card, or include a file that leads to one, and none of the others includes
+ * them. Where there is none, decks by their names: the daemon tells what is wrong with them.
+ */
 export function mainFiles(files: readonly NamedFile[]): string[] {
   const decoder = new TextDecoder();
   const texts = new Map(files.map(({ path, data }) => [path, decoder.decode(data)]));
@@ -27,7 +30,8 @@ export function mainFiles(files: readonly NamedFile[]): string[] {
     return /^\s*begin\s*:\s*data\s*;/im.test(texts.get(path) ?? '') || (includes.get(path) ?? []).some((other) => leads(other, seen));
   };
   const inside = new Set([...includes].flatMap(([path, others]) => others.filter((other) => other !== path)));
-  return files.map(({ path }) => path).filter((path) => !inside.has(path) && leads(path, new Set()));
+  const outer = files.map(({ path }) => path).filter((path) => !inside.has(path)), found = outer.filter((path) => leads(path, new Set()));
+  return found.length > 0 ? found : outer.filter((path) => /\.mbd$/i.test(path));
 }
 
 /** Paths of the files that a deck's `include` cards name, which are relative to its own folder. */

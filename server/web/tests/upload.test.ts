@@ -20,6 +20,12 @@ describe('a deck from the disk', () => {
     expect(mainFiles([file('a', 'begin: data;\ninclude: "a";')])).toEqual(['a']);
   });
 
+  test('has as main file one that is called a deck where no data card is found', () => {
+    expect(mainFiles([file('typo.mbd', 'begin data;'), file('notes.txt')])).toEqual(['typo.mbd']);
+    expect(mainFiles([file('load.MBD', 'include: "part.mbd";'), file('part.mbd', 'set: real L = 1.;')])).toEqual(['load.MBD']);
+    expect(mainFiles([file('notes.txt', 'begin data;')])).toEqual([]);
+  });
+
   test('is named without the folder that all files are in', () => {
     const paths = (...names: string[]) => withoutCommonFolder(names.map((name) => file(name))).map(({ path }) => path);
     expect(paths('m/a.mbd', 'm/sub/b.inc')).toEqual(['a.mbd', 'sub/b.inc']);

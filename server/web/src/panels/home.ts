@@ -116,7 +116,7 @@ export class Home {
     this.welcome.classList.remove('hidden');
     if (mains.length === 0) return this.say('deck', h('div', { class: 'diagnostic' }, 'None of these files is a deck: a deck has a card "begin: data;".'));
     this.say('deck', h('p', {}, 'Which of them is the main file?'),
-      ...mains.map((path) => h('button', { type: 'button', class: 'button', onclick: () => void this.load(files, path) }, path)));
+      ...[...mains].sort().map((path) => h('button', { type: 'button', class: 'button', onclick: () => void this.load(files, path) }, path)));
   }
 
   /** Keeps the list up to date until the page is left. */
