@@ -905,6 +905,19 @@ describe('a deck from the disk', () => {
     });
   });
 
+  test('that is odd is shown with the warning, until that is read, and what it prints is among the events', async () => {
+    await withPage(browser, 'pendulum.mbd', async ({ page }) => {
+      await askForDeck(page);
+      await page.getByLabel('Files of a deck').setInputFiles({ name: 'odd.mbd', mimeType: 'text/plain', buffer: Buffer.from(`set: integer a = 3.7;\nremark: "seven", 3 + 4;\n${readFileSync(`${MODELS}/pendulum.mbd`, 'utf8')}`) });
+      const warning = page.locator('.banner').getByText('warning: 3.7 truncated to 3');
+      await warning.waitFor();
+      await page.locator('.log').getByText('odd.mbd:1: 3.7 truncated to 3').waitFor({ state: 'attached' });
+      await page.locator('.log').getByText(/seven.*7/).waitFor({ state: 'attached' });
+      await page.locator('.banner').getByRole('button', { name: 'Close' }).click();
+      expect(await warning.count()).toBe(0);
+    });
+  });
+
   test('that is no deck is refused before it is sent', async () => {
     await withPage(browser, 'pendulum.mbd', async ({ page }) => {
       await askForDeck(page);

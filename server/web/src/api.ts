@@ -5,7 +5,7 @@ import { createConnectTransport } from '@connectrpc/connect-web';
 import { DeckDiagnosticsSchema, ErrorInfoSchema, SolverFailureSchema, type Diagnostic, type SolverFailure } from './gen/mbcosim/v1/common_pb';
 import { Events } from './gen/mbcosim/v1/events_pb';
 import { Geometry } from './gen/mbcosim/v1/geometry_pb';
-import { Simulations } from './gen/mbcosim/v1/simulations_pb';
+import { Simulations, type CreateSimulationInlineReply } from './gen/mbcosim/v1/simulations_pb';
 import { Telemetry } from './gen/mbcosim/v1/telemetry_pb';
 import { isLost, newRequestId, repeatable } from './requests';
 import { chunks, type NamedFile } from './upload';
@@ -18,11 +18,10 @@ export const telemetry = createClient(Telemetry, transport);
 export const geometry = createClient(Geometry, transport);
 export const events = createClient(Events, transport);
 
-/** Loads a deck; the new simulation's name. */
-export async function loadDeck(files: readonly NamedFile[], main: string): Promise<string> {
+/** Loads a deck: the new simulation, and what its reader had to say of it. */
+export function loadDeck(files: readonly NamedFile[], main: string): Promise<CreateSimulationInlineReply> {
   const options = { displayName: main, requestId: newRequestId() };
-  const reply = await simulations.createSimulationInline({ header: { source: { case: 'bundleMainFile', value: main }, options }, files: chunks(files) });
-  return reply.simulation?.name ?? '';
+  return simulations.createSimulationInline({ header: { source: { case: 'bundleMainFile', value: main }, options }, files: chunks(files) });
 }
 
 /** What a failed call says, taken apart. */

@@ -3,7 +3,7 @@ import { failureOf } from './api';
 import { Desk } from './desk';
 import { download, h, icon, iconButton } from './dom';
 import { csv, fileName, recordingPage } from './export';
-import { Home, STATES } from './panels/home';
+import { Home, STATES, type Heard } from './panels/home';
 import { inputsPanel } from './panels/inputs';
 import { logPanel } from './panels/log';
 import { modesPanel } from './panels/modes';
@@ -28,7 +28,7 @@ const GONE = 'The daemon does not know this simulation any more. What was seen o
 export class App {
   readonly desk = new Desk();
   readonly scene = new ScenePanel(this.desk);
-  readonly home = new Home(this.desk, (name) => void this.open(name), (name) => void this.compare(name));
+  readonly home = new Home(this.desk, (name, heard) => void this.open(name, heard), (name) => void this.compare(name));
   private readonly time = new TimeBar(this.desk);
   private readonly banner = h('div', { class: 'banner hidden', role: 'alert' });
   private readonly chip = h('span', { class: 'chip' });
@@ -70,11 +70,12 @@ export class App {
   }
 
   /** Shows a simulation, unless another is opened before it is there. */
-  async open(name: string): Promise<void> {
+  async open(name: string, heard?: Heard): Promise<void> {
     const wish = ++this.opened;
     try {
       const session = await Session.open(name);
       if (wish !== this.opened) return session.close();
+      if (heard) session.hear(heard.diagnostics, heard.printed);
       this.desk.show(session);
       history.replaceState(null, '', `#simulation=${encodeURIComponent(name)}`);
       void this.home.refresh();
@@ -181,7 +182,7 @@ export class App {
     this.unwatch.forEach((end) => end());
     const session = this.desk.session;
     this.unwatch = session
-      ? [session.info.watch(() => this.updateState()), session.lost.watch(() => this.updateState()), session.gone.watch(() => this.updateState()), session.failure.watch(() => this.updateState())]
+      ? [session.info.watch(() => this.updateState()), session.lost.watch(() => this.updateState()), session.gone.watch(() => this.updateState()), session.failure.watch(() => this.updateState()), session.findings.watch(() => this.updateState())]
       : [];
     this.updateState();
   }
@@ -204,9 +205,11 @@ export class App {
     const { waits } = session.info.value, waiting = waits.map((wait) => `waits ${wait.hasPeer ? 'for the peer of' : 'for a peer on'} port ${wait.port}`);
     const failure = session.failure.value;
     this.banner.classList.toggle('bad', failure !== undefined || state === 'lost');
-    if (failure && !gone && !(lost && failure.passing)) this.say(failure, () => [h('div', { class: 'text' }, h('strong', {}, failure.message), this.worst(), diagnosticsList(failure.diagnostics)),
-      iconButton('close', 'Close', () => (session.failure.value = undefined), { class: 'icon-button small' })]);
+    const findings = session.findings.value, close = (read: () => void) => iconButton('close', 'Close', read, { class: 'icon-button small' });
+    if (failure && !gone && !(lost && failure.passing))
+      this.say(failure, () => [h('div', { class: 'text' }, h('strong', {}, failure.message), this.worst(), diagnosticsList(failure.diagnostics)), close(() => (session.failure.value = undefined))]);
     else if (lost) this.say(gone ? GONE : lost);
+    else if (findings.length > 0 && waits.length === 0) this.say(findings, () => [h('div', { class: 'text' }, diagnosticsList(findings)), close(() => (session.findings.value = []))]);
     else this.say(waiting.join('\n'), () => [h('div', { class: 'text' }, ...waiting.map((words) => h('div', {}, words, h('span', { class: 'since', 'aria-hidden': 'true' }))))]);
     this.banner.querySelectorAll('.since').forEach((since, i) => (since.textContent = ` since ${waits[i].seconds.toFixed(1)} s`));
   }

@@ -4,6 +4,7 @@ import { events, failureOf, remedy, simulations, telemetry, type Failure } from 
 import { describe, eigenvectors, look, stateNames, told } from './questions';
 import { tell } from './events';
 import { duration } from './duration';
+import type { Diagnostic } from './gen/mbcosim/v1/common_pb';
 import { SimulationState, StepOutcome, type SimulationInfo, type Snapshot, type StepReply } from './gen/mbcosim/v1/simulations_pb';
 import { OverflowPolicy, type SubscribeReply } from './gen/mbcosim/v1/telemetry_pb';
 import type { Geometry } from './geometry';
@@ -66,6 +67,8 @@ export class Session implements Shown {
   readonly steps = new Signal<StepRecord[]>([]);
   readonly log = new Signal<LogEntry[]>([]);
   readonly failure = new Signal<Failure | undefined>(undefined);
+  /** Warnings and notes of its deck, until they are read. */
+  readonly findings = new Signal<Diagnostic[]>([]);
   /** Why nothing can be asked of the daemon at the moment; empty: it answers. */
   readonly lost = new Signal('');
   /** The daemon answers and does not know the simulation any more. */
@@ -592,6 +595,13 @@ export class Session implements Shown {
   private tell(failure: Failure): void {
     this.failure.value = failure;
     this.note(failure.message, 'error');
+  }
+
+  /** What the deck's reader said, and what the deck printed. */
+  hear(findings: Diagnostic[], printed: string): void {
+    this.findings.value = findings;
+    for (const { file, line, message } of findings) this.note(`${line ? `${file}:${line}: ` : ''}${message}`);
+    for (const line of printed.split('\n')) if (line) this.note(line);
   }
 
   note(text: string, level: 'info' | 'error' = 'info', wall = new Date()): void {

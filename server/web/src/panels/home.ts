@@ -3,8 +3,8 @@ import { failureOf, loadDeck, remedy, simulations, type Failure } from '../api';
 import type { Desk } from '../desk';
 import { arrange, h, icon, iconButton, rename } from '../dom';
 import { number } from '../format';
-import { SimulationState, type SimulationInfo } from '../gen/mbcosim/v1/simulations_pb';
-import { listSimulations } from '../questions';
+import { SimulationState, type CreateSimulationInlineReply, type SimulationInfo } from '../gen/mbcosim/v1/simulations_pb';
+import { listSimulations, told } from '../questions';
 import { chosenFiles, droppedFiles, mainFiles, type NamedFile } from '../upload';
 import { diagnosticsList } from './diagnostics';
 
@@ -28,6 +28,9 @@ interface Row {
   remove: HTMLElement;
 }
 
+/** What the reader of a deck said, and what the deck printed. */
+export type Heard = Pick<CreateSimulationInlineReply, 'diagnostics' | 'printed'>;
+
 /** What the message is about. */
 type About = 'nothing' | 'deck' | 'failure';
 
@@ -45,7 +48,7 @@ export class Home {
   private readonly rows = new Map<string, Row>();
   private known: SimulationInfo[] = [];
 
-  constructor(private readonly desk: Desk, private readonly open: (name: string) => void, private readonly compare: (name: string) => void) {
+  constructor(private readonly desk: Desk, private readonly open: (name: string, heard?: Heard) => void, private readonly compare: (name: string) => void) {
     this.welcome.append(h('div', { class: 'box' },
       h('h1', {}, 'See it move'),
       h('p', { class: 'soft' }, 'Choose a simulation of this daemon, or bring a deck of your own.'),
@@ -104,9 +107,9 @@ export class Home {
     if (mains.length !== 1) return this.choose(files, mains);
     this.say('deck', h('p', { class: 'soft' }, `Loading ${mains[0]} …`));
     try {
-      const name = await loadDeck(files, mains[0]);
+      const { simulation, diagnostics, printed } = await loadDeck(files, mains[0]);
       this.say('nothing');
-      this.open(name);
+      this.open(told(simulation).name, { diagnostics, printed });
     } catch (thrown) {
       this.tell(failureOf(thrown), files);
     }
@@ -141,7 +144,7 @@ export class Home {
   private tellLost(failure: Failure): void {
     if (this.about === 'failure') this.say('nothing');
     if (!this.desk.shown.value) this.welcome.classList.remove('hidden');
-    const said = told(failure);
+    const said = words(failure);
     if (!this.connection.firstChild?.isEqualNode(said)) this.connection.replaceChildren(said);  // is read aloud once
   }
 
@@ -153,7 +156,7 @@ export class Home {
   tell(failure: Failure, files: readonly NamedFile[] = []): void {
     this.welcome.classList.remove('hidden');
     if (failure.diagnostics.length > 0) this.say('deck', diagnosticsList(failure.diagnostics, files));
-    else this.say('failure', told(failure));
+    else this.say('failure', words(failure));
   }
 
   private draw(): void {
@@ -206,7 +209,7 @@ export class Home {
 }
 
 /** A failure, and what to do about it. */
-function told(failure: Failure): HTMLElement {
+function words(failure: Failure): HTMLElement {
   const hint = remedy(failure);
   return h('div', { class: 'diagnostic' }, h('strong', {}, failure.message), hint && h('p', {}, hint));
 }
