@@ -505,6 +505,11 @@ describe('several readers', () => {
       await other.page.getByRole('button', { name: 'One step (S)' }).click();
       await atStep(other.page, 31);
       await until(visited.page, (wanted) => ((window as unknown as { mbcosim: { desk: { sample: { step: number } } } }).mbcosim.desk.sample.step >= wanted), 30);
+      await other.page.getByRole('button', { name: 'Back to the start' }).click();
+      for (const { page } of [other, visited]) await atStep(page, 0);
+      expect(await recorded(visited.page)).toEqual([0]);
+      await other.page.getByRole('button', { name: 'One step (S)' }).click();
+      for (const { page } of [other, visited]) await atStep(page, 1);
       expect(other.faults).toEqual([]);
       await other.close();
     });

@@ -162,12 +162,12 @@ export class Session implements Shown {
     void this.read();
   }
 
-  /** Takes the values at the last accepted step into the recording. */
-  private async read(undone = false): Promise<void> {
+  /** Takes the values at the last accepted step into the recording. `undone`: see `take`. */
+  private async read(undone = () => false): Promise<void> {
     const layout = this.layout;
     try {
       const reply = await simulations.readVariables({ simulation: this.name, handles: [...layout.handles] });
-      this.take({ step: Number(reply.step), time: reply.time, layout, values: Float64Array.from(reply.values) }, undone);
+      this.take({ step: Number(reply.step), time: reply.time, layout, values: Float64Array.from(reply.values) }, undone());
     } catch (thrown) {
       const failure = failureOf(thrown);
       if (!failure.passing) this.unreadable = Number(this.info.value.step);
@@ -258,8 +258,10 @@ export class Session implements Shown {
     while (!this.ended.signal.aborted) {
       await pause(this.playing.value === 'no' ? 1000 : 400);
       try {
+        const last = this.recording.last, still = () => last !== undefined && last === this.recording.last;
         await this.refresh();
-        if (this.lost.value || this.behind()) await this.read();
+        const undone = still() && Number(this.info.value.step) < Number(last?.step);  // somebody else restored a state
+        if (undone || this.lost.value || this.behind()) await this.read(() => undone && still());
         this.lost.value = '';
         if (this.failure.value?.passing) this.failure.value = undefined;
       } catch (thrown) {
@@ -538,7 +540,7 @@ export class Session implements Shown {
       this.info.value = told((await this.patiently(ask)).simulation);
       this.failure.value = undefined;
       this.stream.abort();  // what is still on its way is of a time undone
-      await this.read(true);
+      await this.read(() => true);
     });
   }
 
