@@ -287,11 +287,11 @@ class Assembly {
     }
     state_ = start_;
     compute_residual();
-    const double at_start = largest_violation();
+    const std::vector<double> input = r_;
     const bool complied = comply(iterations);
     if (is_cancelled()) return {};
     if (complied) {
-      if (std::string fight = contradictions(at_start); !fight.empty()) return fight;
+      if (std::string fight = contradictions(input); !fight.empty()) return fight;
     } else {
       state_ = start_;
     }
@@ -329,9 +329,9 @@ class Assembly {
     return true;
   }
 
-  double largest_violation() const {
+  double largest_violation(const std::vector<double>& r) const {
     double largest = 0;
-    for (int a = node_rows_; a < size_; ++a) largest = std::max(largest, std::abs(r_[rows_[a]]));
+    for (int a = node_rows_; a < size_; ++a) largest = std::max(largest, std::abs(r[rows_[a]]));
     return largest;
   }
 
@@ -362,13 +362,12 @@ class Assembly {
     return delta;
   }
 
-  /// The constraints that stay violated, largest violation of each element first; `at_start`: the
-  /// largest one of the input.
-  std::string contradictions(double at_start) const {
-    const double largest = largest_violation();
-    if (!(largest > kContradicted * at_start)) return {};
+  /// The constraints that stay violated, of each element the largest violation, and what it is with
+  /// the residual of the input.
+  std::string contradictions(const std::vector<double>& input) const {
+    if (!(largest_violation(r_) > kContradicted * largest_violation(input))) return {};
     return "these constraints contradict each other; the least violation that was found leaves" +
-           violations(r_, largest) +
+           violations(r_, &input) +
            "\n  hint: correct the positions or orientations given to one of them, or remove one";
   }
 
@@ -396,31 +395,34 @@ class Assembly {
 
   /// When the input contradicts nothing else.
   std::string contradicted_velocities() const {
-    double largest = 0;
-    for (int a = node_rows_; a < size_; ++a)
-      largest = std::max(largest, std::abs(r_rate_[rows_[a]]));
     char text[32];
     std::snprintf(text, sizeof text, "%.3g", velocity_error());
-    return "the input contradicts prescribed velocities alone" + violations(r_rate_, largest) +
+    return "the input contradicts prescribed velocities alone" + violations(r_rate_) +
            "\n  hint: give the nodes these velocities, or a `derivatives tolerance` larger than " +
            text + " to leave them to the first step";
   }
 
-  /// Each element whose rows in `r` (n) are of the order of the largest, with the worst of them.
-  std::string violations(const std::vector<double>& r, double largest) const {
-    const auto violation = [&](int a) { return std::abs(r[rows_[a]]); };
-    std::map<std::string, std::pair<double, std::string>> by_owner;
+  /// Each element whose rows in `r` (n) are of the order of the largest, with the worst of them,
+  /// and what it is in `input`, which counts, too.
+  std::string violations(const std::vector<double>& r,
+                         const std::vector<double>* input = nullptr) const {
+    const auto size = [&](const std::vector<double>& of, int a) { return std::abs(of[rows_[a]]); };
+    const auto both = [&](int a) { return size(r, a) + (input ? size(*input, a) : 0); };
+    const double largest = largest_violation(r);
+    std::map<std::string, int> worst;  // local row by owner
     for (int a = node_rows_; a < size_; ++a) {
-      if (violation(a) < 1e-2 * largest) continue;
-      const auto [owner, equation] = model_.row_text(rows_[a]);
-      auto& worst = by_owner[owner];
-      if (violation(a) >= worst.first) worst = {violation(a), equation};
+      if (size(r, a) < 1e-2 * largest) continue;
+      const auto [known, added] = worst.try_emplace(model_.row_text(rows_[a]).first, a);
+      if (!added && both(a) >= both(known->second)) known->second = a;
     }
     std::string s;
-    for (const auto& [owner, worst] : by_owner) {
-      char text[32];
-      std::snprintf(text, sizeof text, "%.3g", worst.first);
-      s += "\n  " + owner + ", " + worst.second + ": off by " + text;
+    for (const auto& [owner, a] : worst) {
+      char text[64];
+      std::snprintf(text, sizeof text, ": off by %.3g", size(r, a));
+      s += "\n  " + owner + ", " + model_.row_text(rows_[a]).second + text;
+      if (!input) continue;
+      std::snprintf(text, sizeof text, ", in the input by %.3g", size(*input, a));
+      s += text;
     }
     return s;
   }

@@ -34,7 +34,7 @@ FAULTS = {
     "missing_include": (2, CARD % ("19:10", "error") + "cannot open .*materials.inc", r"hint: check the name"),
     "bad_orientation": (2, CARD % ("21:39", "error") + "orientation matrix is not orthogonal", r"hint: give at least seven correct digits"),
     "redundant": (3, r"redundant or empty equations: .*joint 3 \(revolute hinge\)", r"hint: remove redundant constraints"),
-    "apart": (3, r"joint 2 \(revolute hinge\), position constraint 1: off by 1", r"hint: correct the positions"),
+    "apart": (3, r"joint 2 \(revolute hinge\), position constraint 1: off by 0\.333, in the input by 1\n", r"hint: correct the positions"),
     "step_too_long": (3, r"step at t = 0\.5 \(step 1\): no convergence(.|\n)*structural node 2",
                       r"hint: the time step is too long: structural node 2 turns by 20 rad .* shorten it to about 0\.0025 s"),
     "load_jump": (3, r"step at t = 0\.05 \(step 50\): no convergence(.|\n)*structural node 2",
