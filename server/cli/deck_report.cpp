@@ -4,23 +4,32 @@
 
 #include <algorithm>
 #include <cstdlib>
+#include <filesystem>
 #include <string_view>
 
 namespace mbcosim::cli {
+
+namespace fs = std::filesystem;
 
 namespace {
 
 /// The user's files; notes the names of those that were read.
 class NotedFiles : public FolderSource {
  public:
-  explicit NotedFiles(std::vector<std::string>* read)
-      : FolderSource(".", /*unrestricted=*/true), read_(read) {}
+  NotedFiles(const std::string& deck, std::vector<std::string>* read)
+      : FolderSource(".", /*unrestricted=*/true),
+        deck_(deck),
+        main_(is_piped(deck) ? fs::path(deck).filename().string() : deck),
+        read_(read) {}
+  const std::string& main() const { return main_; }
   Result<std::string> read(const std::string& name) const override {
-    if (read_) read_->push_back(name);
-    return FolderSource::read(name);
+    const std::string& file = name == main_ ? deck_ : name;
+    if (read_) read_->push_back(file);
+    return FolderSource::read(file);
   }
 
  private:
+  const std::string deck_, main_;  ///< where the deck is, what it is called
   std::vector<std::string>* read_;
 };
 
@@ -55,9 +64,16 @@ std::string coloured(const Diagnostic& diagnostic) {
 
 }  // namespace
 
+bool is_piped(const std::string& deck) {
+  std::error_code none;
+  const fs::file_status status = fs::status(deck, none);
+  return fs::is_fifo(status) || fs::is_character_file(status);
+}
+
 DeckReport load_path(const std::string& deck, const SymbolValues& symbols,
                      std::vector<std::string>* read) {
-  return read_deck(NotedFiles(read), deck, {.symbols = symbols});
+  const NotedFiles files(deck, read);
+  return read_deck(files, files.main(), {.symbols = symbols});
 }
 
 void print_diagnostics(const std::vector<Diagnostic>& diagnostics, std::FILE* out) {

@@ -10,6 +10,10 @@
 
 namespace mbcosim::cli {
 
+/// Does the deck come from a pipe or a terminal, as /dev/stdin? It has no folder: files that it
+/// names count from the working one.
+bool is_piped(const std::string& deck);
+
 /// Reads a deck from the user's own files, without the restrictions that uploaded decks are under.
 /// `read` gets the names of all files that it consists of; may be null.
 DeckReport load_path(const std::string& deck, const SymbolValues& symbols = {},

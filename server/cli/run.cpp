@@ -182,8 +182,7 @@ constexpr int kManyUnknowns = 500;
 bool needs_prefix(const RunOptions& options) {
   namespace fs = std::filesystem;
   std::error_code none;
-  const fs::file_status deck = fs::status(options.deck, none);
-  if (!fs::is_fifo(deck) && !fs::is_character_file(deck)) return false;
+  if (!is_piped(options.deck)) return false;
   return options.prefix.empty() || options.prefix.back() == '/' ||
          fs::is_directory(options.prefix, none);
 }

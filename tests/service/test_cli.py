@@ -54,13 +54,16 @@ def test_a_folder_takes_files_of_the_decks_name(deck, tmp_path, folder):
 
 
 def test_a_deck_comes_from_a_pipe(deck, tmp_path):
-    def run(*arguments):
-        return subprocess.run([MBCOSIM, "run", "/dev/stdin", *arguments], cwd=tmp_path, input=deck.read_text(), capture_output=True,
-                              text=True, timeout=60)
+    (tmp_path / "part").write_text(PART)
+
+    def run(*arguments, text=f'include: "part";\n{deck.read_text()}'):
+        return subprocess.run([MBCOSIM, "run", "/dev/stdin", *arguments], cwd=tmp_path, input=text, capture_output=True, text=True, timeout=60)
     assert mbcosim("run", str(deck)).returncode == 0
     piped = run("-o", "out")
     assert (piped.returncode, piped.stderr) == (0, "")
     assert (tmp_path / "out.mov").read_bytes() == (tmp_path / "deck.mov").read_bytes()
+    wrong = run("-o", "out", text='include: "nowhere";')
+    assert wrong.returncode == 2 and wrong.stderr.startswith('stdin:1:10: error: cannot open "nowhere"')
     for nameless in ([], ["-o", "./"]):
         refused = run(*nameless)
         assert refused.returncode == 4 and "a deck from a pipe has no name for its results" in refused.stderr
