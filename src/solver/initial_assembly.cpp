@@ -296,7 +296,10 @@ class Assembly {
       state_ = start_;
     }
     const NullSpace null = find_null_space(matrix(), 1e-12, Watch(cancel_));
-    if (null.rank_loss == 0) return complied ? met_elsewhere() : "";
+    if (null.rank_loss == 0) {
+      const bool was_met = largest_violation(input) <= model_.control.assembly_tolerance;
+      return complied && !was_met ? met_elsewhere() : "";
+    }
     return "these constraints follow from each other: " +
            joined(owners_of(model_, by_model_row(null.left), 6)) +
            "\n  hint: remove the redundant ones, or regularize a joint " + kRegularization;
